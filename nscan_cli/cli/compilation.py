@@ -14,7 +14,7 @@ from nscan_cli.cli.progress import progress, say
 
 if TYPE_CHECKING:
     from nscan_cli.logs.laser_log import LaserLog
-    from nscan_cli.nightly.warm_up import CompileProgress
+    from nscan_cli.warm_up.side_by_side import CompileProgress
 
 COMPILING = "compiling the kernels, once for this version on this machine"
 COMPILING_MORE = "compiling kernels not needed before, once for this version on this machine"
@@ -39,7 +39,7 @@ class Compiling:
     def __init__(self, takes: str, quiet: bool) -> None:
         from nscan_cli.kernels.decorators import on_first_compile
         from nscan_cli.kernels.machine_code import is_uncompiled
-        from nscan_cli.nightly.warm_up import TRACKING_KERNEL
+        from nscan_cli.warm_up.side_by_side import TRACKING_KERNEL
 
         self.has_begun = False
         # Not when it begins: the kernel that is compiled then has a file already, its lock.
@@ -58,22 +58,22 @@ class Compiling:
     def beforehand_for_slam(self, log: LaserLog) -> None:
         """Compile what `slam` needs for a log in two processes; the cache folder has to be there."""
         from nscan_cli.kernels.cache_folder import cache_folder
-        from nscan_cli.nightly import kernel_exercises, warm_up
+        from nscan_cli.warm_up import kernel_exercises, side_by_side
 
         folder = cache_folder()
         assert folder is not None
         self._begin()
         with self._bar(SLAM_KERNELS) as report:
-            warm_up.compile_side_by_side(folder, kernel_exercises.for_slam(log), os.environ, report)
+            side_by_side.compile_side_by_side(folder, kernel_exercises.for_slam(log), os.environ, report)
 
     def all(self, folder: Path) -> None:
         """Compile all kernels that the cache folder lacks, in two processes if it has none."""
-        from nscan_cli.nightly import warm_up
+        from nscan_cli.warm_up import side_by_side
 
-        if warm_up.is_cold():
+        if side_by_side.is_cold():
             self._begin()
         with self._bar(ALL_KERNELS) as report:
-            warm_up.compile_all(folder, report)
+            side_by_side.compile_all(folder, report)
 
     @contextlib.contextmanager
     def _bar(self, kernels: int) -> Iterator[CompileProgress]:

@@ -93,7 +93,7 @@ def command(
                 say(f"{name}: warning: {note}", quiet)
         if planned.to_do or planned.unreadable:
             from nscan_cli.cli.nightly_progress import night_progress
-            from nscan_cli.nightly.warm_up import TRACKING_KERNEL
+            from nscan_cli.warm_up.side_by_side import TRACKING_KERNEL
 
             if scheduler is None:
                 announce_compiling(TRACKING_KERNEL, quiet)

@@ -54,9 +54,9 @@ def run_on_log(
 
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.log_files import files_of
-    from nscan_cli.nightly.warm_up import is_cold
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.log_to_graph import map_log, notices_of_mapping
+    from nscan_cli.warm_up.side_by_side import is_cold
 
     compiling = Compiling("half a minute to a minute", quiet)
     read = log_reader(log)

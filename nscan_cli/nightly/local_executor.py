@@ -14,9 +14,9 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.nightly import bootstrap
+from nscan_cli import bootstrap
 from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, ProgressCallback, Task
-from nscan_cli.nightly.warm_up import compile_kernels
+from nscan_cli.warm_up.side_by_side import compile_kernels
 
 THREADED_LIBRARIES = ("OPENBLAS", "MKL", "OMP")
 """Libraries that are limited to one thread a process: more would change the last digits of results."""
@@ -70,7 +70,7 @@ class WorkerProcess:
         prepare_workspace(self.workspace, task, threads)
         with (self.workspace / "stderr.txt").open("wb") as errors:
             self.process = subprocess.Popen(
-                bootstrap.worker_command("worker", str(self.workspace)),
+                bootstrap.worker_command("nightly.worker", str(self.workspace)),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,

@@ -58,15 +58,15 @@ def map_and_evaluate(
     from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.mapping.viewer.viewer_page import embedded_viewer, viewer_page
-    from nscan_cli.nightly import kernel_exercises, warm_up
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.consistency.options import VerificationOptions
     from nscan_cli.slam.log_to_graph import GraphCounts, map_log, notices_of_mapping, slam_options
+    from nscan_cli.warm_up import kernel_exercises, side_by_side
 
     if cache_folder() is None:
         for share in kernel_exercises.FOR_ALL:
             kernel_exercises.main(*share)
-    kept, began = warm_up.cached_files(), time.perf_counter()
+    kept, began = side_by_side.cached_files(), time.perf_counter()
     reading, mapping = reading_options_from(task["reading"]), task["mapping"]
     options = slam_options(
         mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
@@ -91,7 +91,7 @@ def map_and_evaluate(
     (outputs / "map.png").write_bytes(map_png(image))
     (outputs / "map.yaml").write_bytes(map_yaml("map.png", image))
     seconds: float | None = round(time.perf_counter() - began, 3)
-    if "numba" in sys.modules and warm_up.cached_files() - kept:
+    if "numba" in sys.modules and side_by_side.cached_files() - kept:
         # Cached code is loaded without numba, so new files of the cache were compiled during this run.
         seconds = None
     (outputs / "map.html").write_bytes(

@@ -6,7 +6,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
-from nscan_cli.nightly import warm_up
+from nscan_cli.warm_up import side_by_side
 from tests.cli.documents import assert_error_line
 from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
@@ -68,8 +68,8 @@ def test_mistakes_are_one_line_and_leave_nothing_behind(folder, capsys, argument
 
 def test_a_log_that_cannot_be_read_is_told_before_kernels_are_compiled(folder, capsys, monkeypatch):
     compiled = []
-    monkeypatch.setattr(warm_up, "is_cold", lambda: True)
-    monkeypatch.setattr(warm_up, "compile_side_by_side", lambda *_how: compiled.append(True))
+    monkeypatch.setattr(side_by_side, "is_cold", lambda: True)
+    monkeypatch.setattr(side_by_side, "compile_side_by_side", lambda *_how: compiled.append(True))
     (folder / "empty.log").write_bytes(b"")
     assert run(["slam", "empty.log", "-o", "out.json", "--threads", "2"]) == 65
     assert capsys.readouterr().err == "nscan-cli: empty.log: is empty; give a log with laser scans\n"

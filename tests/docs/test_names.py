@@ -22,7 +22,6 @@ FORMATS = {
     "mcap": "read in logs/recordings/, written in exports/",
     "pairwise": "matching/: pairwise matching; graph/relations/: the relation that it gives",
     "nscan": "cli/: the command; graph/relations/: the relation that it gives",
-    "warm_up": "nightly/: compiles all kernels; cli/: the command that does so",
     "options": "the options of the package that it is in",
 }
 """Stems of files that several packages have, and what they mean."""

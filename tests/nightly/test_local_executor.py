@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from nscan_cli.nightly import bootstrap, local_executor
+from nscan_cli import bootstrap
+from nscan_cli.nightly import local_executor
 from nscan_cli.nightly.local_executor import run_locally
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.task import Outcome, Task
@@ -118,7 +119,7 @@ def test_a_process_ends_with_whoever_has_started_it(endless, scratch):
     """Its standard input is closed when the parent is gone, however that went."""
     place = scratch / "endless"
     local_executor.prepare_workspace(place, endless, 1)
-    process = subprocess.Popen(bootstrap.worker_command("worker", str(place)), stdin=subprocess.PIPE)
+    process = subprocess.Popen(bootstrap.worker_command("nightly.worker", str(place)), stdin=subprocess.PIPE)
     time.sleep(0.5)
     assert process.poll() is None
     process.communicate(timeout=20)

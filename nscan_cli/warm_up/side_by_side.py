@@ -14,10 +14,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from nscan_cli import bootstrap
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import COMPILED_FILE, LOCK_FILE, cache_folder
 from nscan_cli.kernels.compile_lock import kernels_in_work
-from nscan_cli.nightly import bootstrap, kernel_exercises
+from nscan_cli.warm_up import kernel_exercises
 
 CompileProgress = Callable[[int, Sequence[str]], None]
 """Called with the kernels that have been compiled since the start, and the names of those in work."""
@@ -97,8 +98,8 @@ def compile_side_by_side(
 def _started(share: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
     # An interrupt from the terminal is handled by the parent, which then kills the process.
     return subprocess.Popen(
-        bootstrap.worker_command("kernel_exercises", *share), env=environment, stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        bootstrap.worker_command("warm_up.kernel_exercises", *share), env=environment, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
 

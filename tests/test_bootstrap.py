@@ -45,11 +45,11 @@ def test_the_package_is_the_one_that_starts_the_process(trap, tmp_path):
     """Even where the current folder, or PYTHONPATH, has another one."""
     package = tmp_path / "elsewhere" / "nscan_cli"
     (package / "nightly").mkdir(parents=True)
-    for name in ("__init__.py", "nightly/__init__.py", "nightly/bootstrap.py"):
+    for name in ("__init__.py", "nightly/__init__.py", "bootstrap.py"):
         shutil.copy(PACKAGE / name, package / name)
     (package / "nightly" / "worker.py").write_text("def main(place):\n    print(__file__, place)\n")
     done = subprocess.run(
-        [sys.executable, "-P", str(package / "nightly" / "bootstrap.py"), "worker", "a place"],
+        [sys.executable, "-P", str(package / "bootstrap.py"), "nightly.worker", "a place"],
         cwd=trap, env={**os.environ, "PYTHONPATH": str(REPOSITORY)}, capture_output=True, text=True,
         check=False,
     )  # fmt: skip

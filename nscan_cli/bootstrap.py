@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def worker_command(module: str, *arguments: str) -> list[str]:
-    """The command line of a process that runs `main` of a module in this folder."""
+    """The command line of a process that runs `main` of a module of this package, as in `nightly.worker`."""
     return [sys.executable, "-P", __file__, module, *arguments]
 
 
@@ -26,6 +26,6 @@ def import_package_at(folder: Path) -> None:
 
 if __name__ == "__main__":
     own = Path(__file__).parent
-    import_package_at(own.parent)
+    import_package_at(own)
     module, *arguments = sys.argv[1:]
-    importlib.import_module(f"{own.parent.name}.{own.name}.{module}").main(*arguments)
+    importlib.import_module(f"{own.name}.{module}").main(*arguments)

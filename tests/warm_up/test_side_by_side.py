@@ -13,23 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nscan_cli import bootstrap
 from nscan_cli.cli.main import run
 from nscan_cli.cli.nightly_progress import PlainProgress
 from nscan_cli.kernels import cache_folder, machine_code
 from nscan_cli.logs.load import log_from
-from nscan_cli.nightly import (
-    bootstrap,
-    kernel_exercises,
-    local_executor,
-    simulated_drive,
-    warm_up,
-    worker,
-)
+from nscan_cli.nightly import local_executor, worker
 from nscan_cli.nightly.html_report import html_report
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
 from nscan_cli.slam.frontend import tracking_kernels
+from nscan_cli.warm_up import kernel_exercises, side_by_side, simulated_drive
 from tests.cli.room_logs import room_log
 from tests.data import OFFICE_LOG, TURNING_LOG, data_file, find_data
 
@@ -37,7 +32,7 @@ from tests.data import OFFICE_LOG, TURNING_LOG, data_file, find_data
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     (tmp_path / "cache").mkdir()
-    monkeypatch.setattr(warm_up, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(side_by_side, "cache_folder", lambda: tmp_path / "cache")
     monkeypatch.setattr(machine_code, "is_uncompiled", lambda _name: False)
     return tmp_path / "cache"
 
@@ -58,19 +53,19 @@ def calls(monkeypatch):
 
 
 def test_once_on_each_machine(cache, calls, monkeypatch):
-    warm_up.compile_kernels({})
-    warm_up.compile_kernels({})
+    side_by_side.compile_kernels({})
+    side_by_side.compile_kernels({})
     assert calls == [
-        bootstrap.worker_command("kernel_exercises", *parts) for parts in kernel_exercises.FOR_ALL
+        bootstrap.worker_command("warm_up.kernel_exercises", *parts) for parts in kernel_exercises.FOR_ALL
     ]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
         patch.setattr(machine_code, "is_uncompiled", lambda _name: True)
-        warm_up.compile_kernels({})
+        side_by_side.compile_kernels({})
     assert len(calls) == 4
     # Another processor, or another numba.
     monkeypatch.setattr(machine_code, "build_key", lambda: "another")
-    warm_up.compile_kernels({})
+    side_by_side.compile_kernels({})
     assert len(calls) == 6
 
 
@@ -81,7 +76,7 @@ def test_the_command_compiles_all_and_leaves_nothing_to_nightly(cache, calls, mo
     assert run(["warm-up"]) == 0
     assert made == [part for parts in kernel_exercises.FOR_ALL for part in parts]
     assert capsys.readouterr().err == f"nothing to compile: {cache}\n"
-    warm_up.compile_kernels({})
+    side_by_side.compile_kernels({})
     assert calls == []
     monkeypatch.setattr(cache_folder, "cache_folder", lambda: None)
     assert run(["warm-up"]) == 73
@@ -89,10 +84,10 @@ def test_the_command_compiles_all_and_leaves_nothing_to_nightly(cache, calls, mo
 
 
 def test_where_nothing_can_be_kept_nothing_is_done(calls, monkeypatch):
-    monkeypatch.setattr(warm_up, "cache_folder", lambda: None)
-    warm_up.compile_kernels({})
+    monkeypatch.setattr(side_by_side, "cache_folder", lambda: None)
+    side_by_side.compile_kernels({})
     assert calls == []
-    assert warm_up.cached_files() == set()
+    assert side_by_side.cached_files() == set()
 
 
 def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
@@ -130,7 +125,7 @@ from nscan_cli import build_graph, nscan, read_log
 from nscan_cli.kernels.decorators import Kernel
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.log_to_graph import map_log, slam_options
-from nscan_cli.nightly import kernel_exercises
+from nscan_cli.warm_up import kernel_exercises
 loaded, load = [], Kernel._load_or_compile
 def noted(kernel, types, arguments):
     loaded.append(kernel.py_func.__qualname__)
@@ -164,7 +159,7 @@ NEEDED_BY_SLAM = """
 import sys
 from nscan_cli import build_graph, read_log
 from nscan_cli.kernels.decorators import Kernel
-from nscan_cli.nightly import kernel_exercises
+from nscan_cli.warm_up import kernel_exercises
 loaded, load = [], Kernel._load_or_compile
 def noted(kernel, types, arguments):
     loaded.append(kernel.py_func.__qualname__)
@@ -208,7 +203,7 @@ def test_a_time_with_compilation_in_it_is_none(cache, tmp_path, compiles):
 
 
 def test_the_tracking_kernel_is_there():
-    assert callable(getattr(tracking_kernels, warm_up.TRACKING_KERNEL))
+    assert callable(getattr(tracking_kernels, side_by_side.TRACKING_KERNEL))
 
 
 def test_what_is_not_timed_is_said(tmp_path, capsys):
@@ -228,7 +223,7 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
 
 def test_what_a_process_compiles_is_told(tmp_path, monkeypatch):
     """How many kernels are done, and which are in work; nothing says so when all processes have ended."""
-    monkeypatch.setattr(warm_up, "LOOK_INTERVAL", 0.01)
+    monkeypatch.setattr(side_by_side, "LOOK_INTERVAL", 0.01)
     (tmp_path / "a.old-1.code").touch()
     work = "import pathlib, time; (pathlib.Path.cwd() / 'a.new-1.lock').touch(); time.sleep(0.5)"
     command = [sys.executable, "-c", f"import os; os.chdir({str(tmp_path)!r}); {work}"]
@@ -239,7 +234,7 @@ def test_what_a_process_compiles_is_told(tmp_path, monkeypatch):
         told.append((done, list(names)))
         (tmp_path / f"a.b{len(told)}-1.code").touch()
 
-    warm_up.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, report)
+    side_by_side.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, report)
     assert [done for done, _ in told] == list(range(len(told)))
     assert told[-1][1] == ["new"]
 
@@ -259,5 +254,5 @@ def test_an_interrupt_ends_the_processes(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        warm_up.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, interrupted)
+        side_by_side.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, interrupted)
     assert [process.returncode for process in begun] == [-9, -9]

@@ -43,8 +43,8 @@ def _track() -> None:
     """Map the drive from its first scan to the last."""
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
-    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
     from nscan_cli.slam.log_to_graph import map_log, slam_options
+    from nscan_cli.warm_up.simulated_drive import simulated_carmen_log
 
     log = log_from(simulated_carmen_log(), "warm-up.log")
     map_log(log, ReadingOptions(), slam_options(), THREADS, lambda *_progress: None)
@@ -58,7 +58,6 @@ def _refine() -> None:
     from nscan_cli.graph.optimise.whole_graph import optimise_graph
     from nscan_cli.logs.load import log_from
     from nscan_cli.mapping.occupancy import occupancy_grid
-    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
     from nscan_cli.slam.backend.finish import finish_graph
     from nscan_cli.slam.backend.refinement import refine
     from nscan_cli.slam.backend.rejection import reject_contradicting_loops
@@ -67,6 +66,7 @@ def _refine() -> None:
     from nscan_cli.slam.diagnostics.notices import notices
     from nscan_cli.slam.log_to_graph import slam_options
     from nscan_cli.slam.loop_closure.most_certain_paths import relations_on_paths
+    from nscan_cli.warm_up.simulated_drive import simulated_carmen_log
 
     graph = _drive_graph()
     optimise_graph(graph)
@@ -91,9 +91,9 @@ def _drive_graph() -> Graph:
 
     from nscan_cli.files.provenance import as_parameters
     from nscan_cli.graph.model import Graph, NScan, Pairwise
-    from nscan_cli.nightly.simulated_drive import simulated_poses
     from nscan_cli.poses import relative
     from nscan_cli.slam.log_to_graph import slam_options
+    from nscan_cli.warm_up.simulated_drive import simulated_poses
 
     poses = simulated_poses()
     rows = np.arange(len(poses))
@@ -139,8 +139,8 @@ def _map_beginning(reading: ReadingOptions, **changed: Any) -> None:
 
     from nscan_cli.logs.load import log_from
     from nscan_cli.mapping.occupancy import occupancy_grid
-    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
     from nscan_cli.slam.log_to_graph import map_log, slam_options
+    from nscan_cli.warm_up.simulated_drive import simulated_carmen_log
 
     reading = replace(reading, end=20.0)
     log = log_from(simulated_carmen_log(), "warm-up.log", reading)
@@ -159,7 +159,7 @@ def _others() -> None:
     from nscan_cli.errors import InputDataError
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
-    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.warm_up.simulated_drive import simulated_carmen_log
 
     log = log_from(simulated_carmen_log(), "warm-up.log")
     match(log, 0, 2)
