@@ -101,7 +101,7 @@ def changed_view(
 
 def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> StepEvidence | None:
     """The steps of a log and its odometry at the middle beams: that is where scans tell the robot is."""
-    odometry = log.at_middle_of_turns().odometry
+    odometry = log.at_middle_of_sweeps().odometry
     return None if odometry is None else gathered_evidence(log, odometry, options, known)
 
 

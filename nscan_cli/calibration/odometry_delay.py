@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.calibration.file_sweep import usual_sweep_time
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.turn_differences import turn_differences
-from nscan_cli.calibration.turn_of_file import usual_turn
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
@@ -29,9 +29,9 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
     path, measured = log.odometry_path, dict[int, float]()
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
-    rows, turn, delay = _turning(motion, options), usual_turn(log), 0.0
+    rows, sweep, delay = _turning(motion, options), usual_sweep_time(log), 0.0
     for part in (rows[::4], rows[2::4], rows[1::2]):
-        found = {row: motion.turned(row, turn) for row in part}
+        found = {row: motion.turned(row, sweep) for row in part}
         measured.update({row: turned for row, turned in found.items() if turned is not None})
         turns = np.array(list(measured.values()))
         count = np.count_nonzero(np.abs(turns) > options.min_winding)

@@ -87,7 +87,7 @@ class FileCheckOptions:
     lag: LagOptions = field(default_factory=LagOptions)
     """When the odometry of a laser that sees at once is late or early."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
-    """How the time of a laser's turn is taken from its scans."""
+    """How the time of a laser's sweep is taken from its scans."""
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     """When odometry stands though the robot moves."""
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
@@ -213,7 +213,7 @@ class CalibrationOptions:
     clock: ClockOptions = field(default_factory=ClockOptions)
     """How the offset between the clocks of odometry and scans is looked for."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
-    """How the time of the laser's turn is taken from its scans."""
+    """How the time of the laser's sweep is taken from its scans."""
     min_steps: int = 30
     """Least number of steps with motion. A larger value leaves more drives uncalibrated."""
     min_turns: int = 12
@@ -243,14 +243,14 @@ class CalibrationOptions:
     """An angle of the mounting with a larger standard deviation is not applied, rad. A larger value applies
     less certain ones."""
     max_scale_sigma: float = 0.01
-    """A scale of odometry with a larger standard deviation, as a share, is not applied. A larger value
-    applies less certain ones."""
+    """A scale of odometry with a larger standard deviation, as a share, is not applied. A larger
+    value applies less certain ones."""
     max_clock_sigma: float = 0.03
     """An offset of the clocks with a larger standard deviation is not applied, s. A larger value applies less
     certain ones."""
     max_sweep_sigma: float = 0.1
-    """A time of the laser's turn with a larger standard deviation, as a share, is not applied. A larger value
-    applies less certain ones."""
+    """A time of the laser's sweep with a larger standard deviation, as a share, is not applied. A larger
+    value applies less certain ones."""
     max_sideways: float = 0.05
     """Odometry is that of two wheels if its steps go to the side by no more than this share, in the median.
     It is 0.001 to 0.013 on real logs. A larger value takes more robots for ones with two wheels."""

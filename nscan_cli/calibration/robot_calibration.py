@@ -48,7 +48,7 @@ class CalibrationEvidence:
     turned: float
     """Sum of the turns of the measured steps, rad."""
     pairs: int
-    """Pairs of scans that the time of the laser's turn rests on."""
+    """Pairs of scans that the time of the laser's sweep rests on."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Calibration:
     (wheels.py); clock_offset; noise_distance (per metre) and noise_turn (per radian) of steps by odometry."""
     evidence: CalibrationEvidence
     sweep: float
-    """The time of the laser's turn that the steps were measured with, s; negative if the readings are in the
+    """The time of the laser's sweep that the steps were measured with, s; negative if the readings are in the
     reverse order of time, 0 if all are seen at once."""
     stamp: str | None
     """Beam at whose time scans are stamped: first, middle or last; None where nothing tells it."""
@@ -81,11 +81,11 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     """
     if log.odometry is None:
         raise InputDataError(log.source.name, "has no odometry to calibrate", "give a log that has it")
-    turn = calibrated_sweep(log, options)
+    sweep = calibrated_sweep(log, options)
     # What a scan tells is where the robot is at its middle beam.
-    log = turn.log.at_middle_of_turns()
+    log = sweep.log.at_middle_of_sweeps()
     rows = successive_steps(log, options.steps)
-    steps = measure_steps(log, rows, options.steps, turn.corrected if turn.seconds else None)
+    steps = measure_steps(log, rows, options.steps, sweep.corrected if sweep.seconds else None)
     drive = _Drive(log, steps, options)
     if drive.moving.sum() < options.min_steps:
         measured = counted(int(drive.moving.sum()), "step")
@@ -101,7 +101,7 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     return Calibration(
         mirrored,
         {
-            "sweep_time": turn.estimate,
+            "sweep_time": sweep.estimate,
             **_mounting(fit, log.mount, why_open),
             "odometry_scale": by_scale,
             "turn_ratio": ratio,
@@ -112,9 +112,9 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
             ),
             **drive.noise(offset.value, fit, ratio.value, veer.value, mirrored),
         },
-        drive.evidence(len(rows[0]), turn.pairs),
-        turn.seconds,
-        turn.stamp(reading.stamp, offset),
+        drive.evidence(len(rows[0]), sweep.pairs),
+        sweep.seconds,
+        sweep.stamp(reading.stamp, offset),
     )
 
 

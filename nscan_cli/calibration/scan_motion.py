@@ -53,13 +53,13 @@ class ScanMotion:
         count = min(scans, len(self.log) // options.scans_apart)
         return np.unique(np.linspace(1, max(len(self.log) - 2, 1), count).astype(np.int64))
 
-    def turning_rows(self, turn: float, options: SweepCheckOptions, scans: int, most: int) -> Indices:
-        """Rows (n,) of scans in which the robot turns enough during a `turn` of the laser (s), the fastest
+    def turning_rows(self, sweep: float, options: SweepCheckOptions, scans: int, most: int) -> Indices:
+        """Rows (n,) of scans in which the robot turns enough during a `sweep` of the laser (s), the fastest
         first: at most so many, of so many `scans`."""
         rows = self.spread_rows(options, scans)
         rates = np.abs(self.rates(rows))
         order = np.argsort(-rates, kind="stable")
-        fastest: Indices = rows[order[rates[order] * turn > options.min_winding]]
+        fastest: Indices = rows[order[rates[order] * sweep > options.min_winding]]
         return fastest[:most]
 
     def twist(self, row: int) -> Array | None:
@@ -106,8 +106,8 @@ class ScanMotion:
             return None
         return end.pose / seconds
 
-    def corrected(self, row: int, turn: float) -> Array | None:
-        """Points (m, 2) of a scan from where the laser is at its middle beam, if it turns in `turn` (s).
+    def corrected(self, row: int, sweep: float) -> Array | None:
+        """Points (m, 2) of a scan from where the laser is at its middle beam, if a `sweep` takes so long (s).
 
         None in doubt.
         """
@@ -115,15 +115,15 @@ class ScanMotion:
         if scan is None or twist is None:
             return None
         points = scan[0].copy()
-        move_along_arc(points, scan[1] * turn, twist, False)
+        move_along_arc(points, scan[1] * sweep, twist, False)
         return points
 
-    def turned(self, row: int, turn: float) -> float | None:
+    def turned(self, row: int, sweep: float) -> float | None:
         """rad; how far the laser turns from the scan before a row to the one after it, by corrected scans.
 
         None in doubt.
         """
-        before, at, after = (self.corrected(each, turn) for each in (row - 1, row, row + 1))
+        before, at, after = (self.corrected(each, sweep) for each in (row - 1, row, row + 1))
         twist = self.twist(row)
         if before is None or at is None or after is None or twist is None:
             return None
@@ -135,15 +135,15 @@ class ScanMotion:
         ]
         return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
 
-    def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
-        """(T,) energy of two scans, per point, for each assumed time of a turn (T,), s; None in doubt."""
+    def energies(self, one: int, other: int, sweeps: Sequence[float]) -> Array | None:
+        """(T,) energy of two scans, per point, for each assumed time of a sweep (T,), s; None in doubt."""
         before, after = self.twist(one), self.twist(other)
         if before is None or after is None:
             return None
         way = 0.5 * (before + after) * float(self.log.times[other] - self.log.times[one])
-        found = np.empty(len(turns))
-        for k, turn in enumerate(turns):
-            first, second = self.corrected(one, turn), self.corrected(other, turn)
+        found = np.empty(len(sweeps))
+        for k, sweep in enumerate(sweeps):
+            first, second = self.corrected(one, sweep), self.corrected(other, sweep)
             if first is None or second is None:
                 return None
             end = match_scans(first, second, way, self.steps.pair, is_near=k > 0)
@@ -151,7 +151,7 @@ class ScanMotion:
         return found
 
     def _scan(self, row: int) -> tuple[Array, Array] | None:
-        """Points (m, 2) of a scan, and where in a turn (m,) each was measured, in turns from the middle beam.
+        """Points (m, 2) of a scan, and when each (m,) was measured from the middle beam on, in sweeps.
 
         None with too few points.
         """

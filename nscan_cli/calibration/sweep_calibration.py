@@ -1,4 +1,4 @@
-"""The turn of the laser of a drive that is calibrated: its time, and the beam that scans are stamped at."""
+"""The sweep of the laser of a drive that is calibrated: its time, and the beam that scans are stamped at."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nscan_cli.calibration.estimate import Estimate, estimate
+from nscan_cli.calibration.file_sweep import first_to_last, stamp_place, usual_sweep_time, with_sweep_times
 from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_time import sweep_time
-from nscan_cli.calibration.turn_of_file import first_to_last, stamp_place, usual_turn, with_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 
@@ -19,12 +19,12 @@ FEW_TURNS = "too few scans are taken in turns"
 
 @dataclass(frozen=True)
 class CalibratedSweep:
-    """The turn of a laser by the scans of a log."""
+    """The sweep of a laser by the scans of a log."""
 
     log: LaserLog
-    """The log with the times of beams of that turn."""
+    """The log with the times of beams of that sweep."""
     estimate: Estimate
-    """The time of a turn, s; negative where the readings are in the reverse order of time."""
+    """The time of a sweep, s; negative where the readings are in the reverse order of time."""
     pairs: int
     """Number of pairs of scans that the estimate rests on."""
     seconds: float
@@ -49,15 +49,15 @@ class CalibratedSweep:
 
 
 def calibrated_sweep(log: LaserLog, options: CalibrationOptions) -> CalibratedSweep:
-    """The turn of a log's laser, measured by its scans."""
-    told, period = usual_turn(log), float(np.median(np.diff(log.times)))
+    """The sweep of a log's laser, measured by its scans."""
+    told, period = usual_sweep_time(log), float(np.median(np.diff(log.times)))
     steps = replace(options.steps, max_beams=options.sweep.time.max_beams)
     motion = ScanMotion.of_log(log, steps, options.sweep)
     found = sweep_time(motion, max(abs(told), period), options.sweep)
     seconds = found.believed(told, period, options.sweep.sigmas)
-    if seconds and found.sigma > options.max_sweep_sigma * abs(found.turn):
+    if seconds and found.sigma > options.max_sweep_sigma * abs(found.seconds):
         seconds = told
     if seconds != told:
-        log = with_turns(log, np.full(len(log), seconds), log.reading.stamp)
-    by_scans = estimate(found.turn, found.sigma, told, FEW_TURNS)
+        log = with_sweep_times(log, np.full(len(log), seconds), log.reading.stamp)
+    by_scans = estimate(found.seconds, found.sigma, told, FEW_TURNS)
     return CalibratedSweep(log, by_scans, found.pairs, seconds, options, motion)

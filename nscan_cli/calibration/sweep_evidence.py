@@ -1,7 +1,8 @@
-"""How long a laser turns, by its scans: they fit best if every beam is seen from where the robot was.
+"""How long a sweep of the laser takes, by its scans.
 
-If the robot turns during a turn of the laser, the scan is stretched or compressed by its motion; if it
-stands, the scan is not. So two scans that were taken during different motions fit best with the true time.
+They fit best if every beam is seen from where the robot was. If the robot turns during a sweep of the laser,
+the scan is stretched or compressed by its motion; if it stands, the scan is not. So two scans that were taken
+during different motions fit best with the true time.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from nscan_cli.poses import Array, Indices
 
 @dataclass(frozen=True)
 class SweepEvidence:
-    """What pairs of scans say of times of a turn."""
+    """What pairs of scans say of times of a sweep."""
 
-    turns: Array
+    sweeps: Array
     """(T,) the times that were tried, s; negative: readings in the reverse order of time."""
     energies: Array
     """(P, T) energy of each of P pairs matched with each time, per point; smaller is sharper."""
@@ -36,7 +37,7 @@ class SweepEvidence:
         """
         if self.is_little:
             return 0.0
-        places = [int(np.argmin(np.abs(self.turns - turn))) for turn in (better, worse)]
+        places = [int(np.argmin(np.abs(self.sweeps - sweep))) for sweep in (better, worse)]
         own = np.unique(self.first, return_inverse=True)[1]
         gains = self._clipped(self.energies[:, places[1]] - self.energies[:, places[0]])
         gains = np.bincount(own, gains) / np.bincount(own)
@@ -52,9 +53,9 @@ class SweepEvidence:
     def sharpest(self) -> float:
         """The time with the least energy of all pairs, s."""
         if not len(self.energies):
-            return float(self.turns[0])
+            return float(self.sweeps[0])
         gains = self._clipped(self.energies - self.energies[:, :1])
-        return float(self.turns[int(np.argmin(gains.mean(axis=0)))])
+        return float(self.sweeps[int(np.argmin(gains.mean(axis=0)))])
 
     def _clipped(self, values: Array) -> Array:
         """Columns (P, ...) without what is far from their medians."""
@@ -65,20 +66,20 @@ class SweepEvidence:
 
 
 def sweep_evidence(
-    motion: ScanMotion, turns: Sequence[float], told: float, options: SweepCheckOptions
+    motion: ScanMotion, sweeps: Sequence[float], told: float, options: SweepCheckOptions
 ) -> SweepEvidence:
-    """What the scans of a log say of some times of a turn, s, without its odometry and times of beams.
+    """What the scans of a log say of some times of a sweep, s, without its odometry and times of beams.
 
     No more pairs are compared where `told`, one of those times, fits better than the others, or another far
     better than it. Times that fit clearly worse than it are left out.
     """
-    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))), np.empty(0, np.int64), options)
-    longest = max(abs(turn) for turn in turns)
+    evidence = SweepEvidence(np.array(sweeps), np.empty((0, len(sweeps))), np.empty(0, np.int64), options)
+    longest = max(abs(sweep) for sweep in sweeps)
     for one, other in turning_pairs(motion, longest, options, options.scans, options.pairs):
         if motion.change_of_turn(one, other) * longest <= options.min_winding:
             # The estimate of single ranges was wrong.
             continue
-        energies = motion.energies(one, other, evidence.turns.tolist())
+        energies = motion.energies(one, other, evidence.sweeps.tolist())
         if energies is not None:
             energies, first = np.vstack([evidence.energies, energies]), np.append(evidence.first, one)
             evidence = replace(evidence, energies=energies, first=first)
@@ -102,25 +103,25 @@ def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions
         least = options.settled_sigmas
     else:
         return False
-    return all(evidence.sigmas(best, turn) >= least for turn in evidence.turns.tolist() if turn != best)
+    return all(evidence.sigmas(best, sweep) >= least for sweep in evidence.sweeps.tolist() if sweep != best)
 
 
 def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> SweepEvidence:
     """The evidence without the times that fit clearly worse than the one that the file tells."""
     if len(evidence.energies) < options.least_decisive:
         return evidence
-    kept = [evidence.sigmas(told, turn) < options.dropped_sigmas for turn in evidence.turns.tolist()]
-    return replace(evidence, turns=evidence.turns[kept], energies=evidence.energies[:, kept])
+    kept = [evidence.sigmas(told, sweep) < options.dropped_sigmas for sweep in evidence.sweeps.tolist()]
+    return replace(evidence, sweeps=evidence.sweeps[kept], energies=evidence.energies[:, kept])
 
 
 def turning_pairs(
-    motion: ScanMotion, turn: float, options: SweepCheckOptions, scans: int, most: int
+    motion: ScanMotion, sweep: float, options: SweepCheckOptions, scans: int, most: int
 ) -> Iterator[tuple[int, int]]:
     """Rows of two scans each between which the motion has changed; no scan is first again before all were.
 
     At most so many are first, of so many `scans`.
     """
-    fast, shifts = motion.turning_rows(turn, options, scans, most), np.array(options.shifts)
+    fast, shifts = motion.turning_rows(sweep, options, scans, most), np.array(options.shifts)
     for begin in range(len(shifts)):
         # Each scan begins with another shift, and comes to all of them.
         others = fast + shifts[(begin + np.arange(len(fast))) % len(shifts)]
@@ -128,6 +129,6 @@ def turning_pairs(
         found = np.stack([fast[inside], others[inside]], axis=1)
         rates = motion.rates(found.ravel()).reshape(-1, 2)
         seconds = np.abs(np.diff(motion.log.times[found], axis=1)[:, 0])
-        used = np.abs(rates[:, 1] - rates[:, 0]) * turn > options.min_winding
+        used = np.abs(rates[:, 1] - rates[:, 0]) * sweep > options.min_winding
         used &= 0.5 * np.abs(rates.sum(axis=1)) * seconds <= options.max_apart
         yield from found[used].tolist()

@@ -1,4 +1,4 @@
-"""The parameters of what scans tell of the turn of their laser."""
+"""The parameters of what scans tell of the sweep of their laser."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ScanTurnOptions:
 
 @dataclass(frozen=True)
 class SweepTimeOptions:
-    """How the time of a turn is measured, with its standard deviation."""
+    """How the time of a sweep is measured, with its standard deviation."""
 
     scans: int = 480
     """Number of scans, evenly spread, among which turns of the robot are looked for. More find more and take
@@ -35,10 +35,10 @@ class SweepTimeOptions:
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
     longer."""
     reach: float = 1.4
-    """Times are tried in both directions up to this multiple of the longest possible turn, so that the best
+    """Times are tried in both directions up to this multiple of the longest possible sweep, so that the best
     one is not at an end. A larger value takes longer."""
     step: float = 0.1
-    """Interval between the times that are tried, in longest turns. A smaller value takes longer."""
+    """Interval between the times that are tried, in longest sweeps. A smaller value takes longer."""
     fitted: int = 3
     """Number of times on each side of the best one that a parabola fits. With more the curve is less like a
     parabola."""
@@ -64,7 +64,7 @@ class SweepTimeOptions:
 
 @dataclass(frozen=True)
 class SweepCheckOptions:
-    """How the time of a laser's turn is taken from its scans."""
+    """How the time of a laser's sweep is taken from its scans."""
 
     scans: int = 240
     """Scans, evenly spread, among which turns are looked for. More find more, and take longer."""
@@ -107,7 +107,7 @@ class SweepCheckOptions:
     """Largest turn between the scans of a pair, rad. A larger value finds more pairs, some of which do not
     match."""
     min_winding: float = math.radians(2.5)
-    """Least turn of the robot during a turn of the laser, and least difference of two such turns, rad. A
+    """Least turn of the robot during a sweep of the laser, and least difference of two such turns, rad. A
     larger value tells more of each pair, and finds fewer."""
     least_winding: float = math.radians(1.0)
     """Least turn of the robot, and least difference of two, where the file has times of beams and fewer than
@@ -123,7 +123,7 @@ class SweepCheckOptions:
     scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
     """How turns of the robot are found."""
     time: SweepTimeOptions = field(default_factory=SweepTimeOptions)
-    """How the time of a turn is measured where the file has none, and by `calibrate`."""
+    """How the time of a sweep is measured where the file has none, and by `calibrate`."""
     longest_delay: float = 1.0
     """Longest delay of odometry that is looked for, s. A larger value takes longer."""
     delay_step: float = 0.01

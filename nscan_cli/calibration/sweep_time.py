@@ -1,4 +1,4 @@
-"""How long a turn of the laser takes, by its scans: a value with its standard deviation.
+"""How long a sweep of the laser takes, by its scans: a value with its standard deviation.
 
 Pairs of scans that were taken while the robot turned differently are matched with many assumed times. Their
 energies have a minimum at the true one.
@@ -20,10 +20,10 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class SweepTime:
-    """The time of a turn that makes scans sharpest."""
+    """The time of a sweep that makes scans sharpest."""
 
-    turn: float
-    """s; negative if the readings are in the reverse order of time, nearly 0 if all are seen at once."""
+    seconds: float
+    """Negative if the readings are in the reverse order of time, nearly 0 if all are seen at once."""
     sigma: float
     """Standard deviation, s; inf where the robot hardly turns, or the scans do not tell."""
     pairs: int
@@ -32,11 +32,11 @@ class SweepTime:
     def believed(self, told: float, period: float, sigmas: float) -> float:
         """The time to use if the file tells one, 0 for none, and scans follow each other in a period, all s.
 
-        It is the file's time, unless the scans contradict it by enough standard deviations. No turn takes
+        It is the file's time, unless the scans contradict it by enough standard deviations. No sweep takes
         longer than the time from scan to scan, or than the file says.
         """
         longest = max(period, abs(told))
-        value, bound = float(np.clip(self.turn, -longest, longest)), sigmas * self.sigma
+        value, bound = float(np.clip(self.seconds, -longest, longest)), sigmas * self.sigma
         for known in (told, -told, 0.0, np.copysign(period, value)):
             if abs(value - known) <= bound:
                 return known
@@ -44,55 +44,55 @@ class SweepTime:
 
 
 def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> SweepTime:
-    """The time of a turn of the laser of a log, of about `longest` (s) at most, in both directions.
+    """The time of a sweep of the laser of a log, of about `longest` (s) at most, in both directions.
 
     The standard deviation is that of the jackknife over the pairs (B. Efron, "The Jackknife, the Bootstrap
-    and Other Resampling Plans", 1982), with what uneven turns add.
+    and Other Resampling Plans", 1982), with what uneven turns of the robot add.
     """
     time = options.time
     count = round(time.reach / time.step)
-    turns = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
-    energies = _energies(motion, longest, turns, options)
+    sweeps = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
+    energies = _energies(motion, longest, sweeps, options)
     pairs = len(energies)
     if pairs < options.min_pairs:
         return SweepTime(0.0, np.inf, pairs)
-    turn = _sharpest(turns, energies, time)
-    if abs(turn) >= turns[-2]:
+    sweep = _sharpest(sweeps, energies, time)
+    if abs(sweep) >= sweeps[-2]:
         # Beyond what was tried.
         return SweepTime(0.0, np.inf, pairs)
     without_one = np.array([
-        _sharpest(turns, np.delete(energies, pair, axis=0), time) for pair in range(pairs)
+        _sharpest(sweeps, np.delete(energies, pair, axis=0), time) for pair in range(pairs)
     ])  # fmt: skip
     sigma = np.sqrt((pairs - 1) * without_one.var())
-    return SweepTime(turn, float(np.hypot(sigma, time.unsteadiness * turn)), pairs)
+    return SweepTime(sweep, float(np.hypot(sigma, time.unsteadiness * sweep)), pairs)
 
 
-def _energies(motion: ScanMotion, longest: float, turns: Array, options: SweepCheckOptions) -> Array:
-    """(P, T) energies of P pairs for times of a turn (T,), of scans in steady turns if there are enough."""
+def _energies(motion: ScanMotion, longest: float, sweeps: Array, options: SweepCheckOptions) -> Array:
+    """(P, T) energies of P pairs for times of a sweep (T,), of scans in steady turns if there are enough."""
     time = options.time
     steady, uneven = list[Array](), list[Array]()
     for one, other in _pairs(motion, longest, options):
         is_steady = motion.is_steady(one, time) and motion.is_steady(other, time)
         if not is_steady and len(uneven) == time.pairs:
             continue
-        energies = motion.energies(one, other, turns.tolist())
+        energies = motion.energies(one, other, sweeps.tolist())
         if energies is not None:
             (steady if is_steady else uneven).append(energies)
         if len(steady) == time.pairs:
             break
     if len(steady) < time.min_steady:
         steady += uneven[: time.pairs - len(steady)]
-    return np.array(steady).reshape(-1, len(turns))
+    return np.array(steady).reshape(-1, len(sweeps))
 
 
 def _pairs(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
     return turning_pairs(motion, longest, options, options.time.scans, options.time.most_rows)
 
 
-def _sharpest(turns: Array, energies: Array, options: SweepTimeOptions) -> float:
+def _sharpest(sweeps: Array, energies: Array, options: SweepTimeOptions) -> float:
     """The time with the least energy (P, T) of all pairs, by a parabola through the times (T,) beside it."""
     above = energies - energies.min(axis=1, keepdims=True)
     most = options.cap * float(np.median(above.max(axis=1)))
     means: Array = np.minimum(above, most).mean(axis=0)
-    best, step = float(turns[np.argmin(means)]), float(turns[1] - turns[0])
-    return float(np.clip(parabola_minimum(turns, means, options.fitted), best - step, best + step))
+    best, step = float(sweeps[np.argmin(means)]), float(sweeps[1] - sweeps[0])
+    return float(np.clip(parabola_minimum(sweeps, means, options.fitted), best - step, best + step))

@@ -37,7 +37,7 @@ from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
 from nscan_cli.logs.two_odometries import of_one_source
 from nscan_cli.logs.unit_stretches import in_one_unit
 from nscan_cli.logs.unusable_readings import unusable_readings
-from nscan_cli.logs.whole_turn import in_whole_turns
+from nscan_cli.logs.whole_revolution import in_whole_revolutions
 from nscan_cli.poses import Array, Indices, are_known
 
 
@@ -111,7 +111,9 @@ def laser_log(
         written, changed = corrected_directions(
             seen, beams, -1 if options.flip else 1, checks.direction_changes
         )
-    directions, told = in_whole_turns(raw, written, limits, options, checks.whole_turn, checks.beam_spacing)
+    directions, told = in_whole_revolutions(
+        raw, written, limits, options, checks.whole_turn, checks.beam_spacing
+    )
     if not told:
         directions, told = checked_by_walls(raw, written, limits, options, checks.beam_spacing)
     angle_min, angle_increment = directions
@@ -146,7 +148,7 @@ def laser_log(
     sweep = _sweep(raw, angle_increment, times, options, checks)
     if sweep.origin:
         findings.used["turn"] = sweep.origin
-    swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
+    swept = beam_times(sweep.seconds[numbers], angle_increment[rows], beams, options.stamp)
     odometry, path, slow = _odometry(motion, times, raw.ranges, options, checks)
     # Of several lasers, each says its own.
     of = f"{laser}: " if len(findings.lasers) > 1 else ""
@@ -249,7 +251,7 @@ def _credible(
 def _sweep(
     raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions, checks: ScanCheckOptions
 ) -> Sweep:
-    """The times of the laser's turns (S,), in order of time; `increments` (S,) are in file order, rad."""
+    """The times of the laser's sweeps (S,), in order of time; `increments` (S,) are in file order, rad."""
     if options.sweep is not None:
         return Sweep(np.full(len(times.times), options.sweep), "--sweep")
     rows, beams = times.rows, beam_counts(raw.ranges, raw.beams)

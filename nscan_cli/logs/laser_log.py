@@ -192,7 +192,7 @@ class LaserLog:
         beams = self.beam_times
         return self.times if beams is None else self.times + beams.middles(self.beam_counts())
 
-    def at_middle_of_turns(self) -> LaserLog:
+    def at_middle_of_sweeps(self) -> LaserLog:
         """The log with each scan at the time of its middle beam, and the odometry there, if the laser turns.
 
         How fast the robot moves then matters least for where a scan is: errors at its two ends cancel out.

@@ -20,7 +20,7 @@ from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
 from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.orientations import OrientationOptions
-from nscan_cli.logs.recordings.turn_segments import TurnSegmentOptions
+from nscan_cli.logs.recordings.sweep_segments import SweepSegmentOptions
 from nscan_cli.logs.repeated_reading import RepeatedReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions
 from nscan_cli.logs.robot_path import RobotPathOptions
@@ -34,7 +34,7 @@ from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
 from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.logs.two_odometries import TwoOdometriesOptions
 from nscan_cli.logs.unit_stretches import UnitStretchOptions
-from nscan_cli.logs.whole_turn import WholeTurnOptions
+from nscan_cli.logs.whole_revolution import WholeRevolutionOptions
 
 
 @dataclass(frozen=True)
@@ -70,14 +70,14 @@ class ScanCheckOptions:
     """Whether directions change in the file alone."""
     beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
     """Whether walls fit the angle between beams."""
-    whole_turn: WholeTurnOptions = field(default_factory=WholeTurnOptions)
-    """Whether beams cover a whole turn."""
+    whole_turn: WholeRevolutionOptions = field(default_factory=WholeRevolutionOptions)
+    """Whether beams cover a whole revolution. Saved graphs have this name, and `turn_segments`."""
     text_logs: TextLogOptions = field(default_factory=TextLogOptions)
     """What numbers in text logs may be."""
     interlaced: InterlacedOptions = field(default_factory=InterlacedOptions)
     """Whether scans of a CARMEN log are interlaced."""
-    turn_segments: TurnSegmentOptions = field(default_factory=TurnSegmentOptions)
-    """Whether messages are segments of turns."""
+    turn_segments: SweepSegmentOptions = field(default_factory=SweepSegmentOptions)
+    """Whether messages are segments of sweeps."""
     two_lasers: TwoLaserOptions = field(default_factory=TwoLaserOptions)
     """Whether a topic has the scans of two lasers."""
     robot_parts: RobotPartsOptions = field(default_factory=RobotPartsOptions)
@@ -105,7 +105,7 @@ class ScanCheckOptions:
     robot_path: RobotPathOptions = field(default_factory=RobotPathOptions)
     """How the robot moves between two poses."""
     sweep: SweepOptions = field(default_factory=SweepOptions)
-    """Which times of a turn of the laser can be."""
+    """Which times of a sweep of the laser can be."""
 
 
 SCAN_CHECKS = ScanCheckOptions()

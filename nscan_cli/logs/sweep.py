@@ -1,4 +1,4 @@
-"""How long a laser takes for its turn by its file, and which such times are plausible."""
+"""How long a laser takes for its sweep by its file, and which such times are plausible."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ BEFORE_STAMP = {"first": 0.0, "middle": 0.5, "last": 1.0}
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """Which times of a turn can be."""
+    """Which times of a sweep can be."""
 
     shortest: float = 1e-3
-    """A laser whose turn takes less time than this sees at once, s. A larger value leaves more lasers
+    """A laser whose sweep takes less time than this sees at once, s. A larger value leaves more lasers
     uncorrected."""
     least_turn_time: float = 0.012
     """No laser turns in less time than this, s: those in use turn up to 80 times a second. A larger value
@@ -48,10 +48,10 @@ class RecordedSweep:
 
 @dataclass(frozen=True)
 class Sweep:
-    """How long the turns of S scans take, in order of time."""
+    """How long the sweeps of S scans take, in order of time."""
 
-    turns: Array
-    """(S,) time of 360°, s; negative where the readings are in the reverse order of time; 0: seen at once."""
+    seconds: Array
+    """(S,) time of 360°; negative where the readings are in the reverse order of time; 0: seen at once."""
     origin: str
     """The origin of the times, for `info`; empty if the log has nothing about them."""
     said: tuple[str, ...] = ()
@@ -66,11 +66,11 @@ def sweep_of_file(
     as_recorded: bool = False,
     options: SweepOptions = SweepOptions(),
 ) -> Sweep:
-    """The likeliest times of the turns, from what S scans say of them.
+    """The likeliest times of the sweeps, from what S scans say of them.
 
     `increments` (S,) rad and `beams` (S,) are the angles between beams and their numbers, `times` (S,) those
     of the scans, s; all are in order of time. A time from beam to beam is implausible if the scan would last
-    longer than the time to the next, or the turn would be faster than any laser. It is then replaced by the
+    longer than the time to the next, or the sweep would be faster than any laser. It is then replaced by the
     time between scans, unless `as_recorded`. A file without times of beams may be of a laser that sees at
     once.
     """
@@ -84,15 +84,15 @@ def sweep_of_file(
     per_beam = np.where(some, told.increment, usual)
     ratio = per_beam / usual
     per_beam[(ratio > options.varying) | (ratio < 1.0 / options.varying)] = usual
-    turns = per_beam * 2 * np.pi / np.abs(increments)
-    usual_turn = float(np.median(np.abs(turns)))
-    if usual_turn < options.shortest:
-        return Sweep(none, f"time_increment of the messages: a turn takes {usual_turn * 1e3:.2g} ms")
+    sweeps = per_beam * 2 * np.pi / np.abs(increments)
+    usual_sweep = float(np.median(np.abs(sweeps)))
+    if usual_sweep < options.shortest:
+        return Sweep(none, f"time_increment of the messages: a turn takes {usual_sweep * 1e3:.2g} ms")
     period = usual_period(times)
     lasts = float(np.median(np.abs(per_beam) * np.maximum(beams - 1, 1)))
     too_long = period > 0.0 and lasts > options.jitter * period
-    if as_recorded or (usual_turn >= options.least_turn_time and not too_long):
-        return Sweep(turns, "time_increment of the messages")
+    if as_recorded or (usual_sweep >= options.least_turn_time and not too_long):
+        return Sweep(sweeps, "time_increment of the messages")
     scan_time = told.scan_time[np.isfinite(told.scan_time) & (told.scan_time > 0.0)]
     likely = float(np.median(scan_time)) if len(scan_time) else period
     origin = "scan_time" if len(scan_time) else "the time between scans"
@@ -103,7 +103,7 @@ def sweep_of_file(
     why = (
         f"a scan would take {lasts:.3g} s, but the next comes after {period:.3g} s"
         if too_long
-        else f"a turn would take {usual_turn:.2g} s, and no laser turns so fast"
+        else f"a turn would take {usual_sweep:.2g} s, and no laser turns so fast"
     )
     said = (
         f"time_increment of the messages is likely wrong: {why}; {origin} is used, a turn of {likely:.3g} s, "
@@ -112,14 +112,14 @@ def sweep_of_file(
     return Sweep(np.full(len(times), np.copysign(likely, usual)), origin, (said,))
 
 
-def beam_times(turns: Array, increments: Array, beams: Indices, stamp: str) -> BeamTimes | None:
+def beam_times(seconds: Array, increments: Array, beams: Indices, stamp: str) -> BeamTimes | None:
     """The times of the beams of S scans; None if all are seen at once.
 
-    `turns` (S,) are the times of a turn, s, as in Sweep, `increments` (S,) the angles between beams, rad.
+    `seconds` (S,) are the times of a sweep, as in Sweep, `increments` (S,) the angles between beams, rad.
     """
-    if not turns.any():
+    if not seconds.any():
         return None
-    step = turns * np.abs(increments) / (2 * np.pi)
+    step = seconds * np.abs(increments) / (2 * np.pi)
     lasts = step * np.maximum(beams - 1, 0)
     # What the stamp is set by is the course of time, whatever the order of the readings.
     began = np.where(step < 0.0, -lasts, 0.0)

@@ -89,7 +89,7 @@ class SlamState:
     @classmethod
     def of_log(cls, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
         """The state before the first scan of a log."""
-        recorded, log = log, log.at_middle_of_turns().moving_along(None)
+        recorded, log = log, log.at_middle_of_sweeps().moving_along(None)
         odometry = log.odometry
         jumps = stalls = np.zeros(0, dtype=np.int64)
         if odometry is not None:

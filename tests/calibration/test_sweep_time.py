@@ -44,13 +44,13 @@ def by_scans(turn: float, rate: float) -> SweepTime:
 @pytest.mark.parametrize("rate", [0.5, 1.5, 2.8])
 def test_the_time_comes_out_with_its_standard_deviation(turn, rate):
     found = by_scans(turn, rate)
-    assert found.turn == pytest.approx(turn, abs=3 * found.sigma + 1e-3)
+    assert found.seconds == pytest.approx(turn, abs=3 * found.sigma + 1e-3)
     assert found.sigma < 0.015
 
 
 def test_errors_are_as_large_as_said():
     off = [
-        (found.turn - turn) / found.sigma
+        (found.seconds - turn) / found.sigma
         for turn in (0.2, 0.13, 0.05, -0.2, 0.0)
         for rate in (0.5, 1.5, 2.8)
         for found in (by_scans(turn, rate),)
@@ -84,4 +84,4 @@ def test_the_file_is_believed_unless_the_scans_contradict_it():
 ])  # fmt: skip
 def test_real_lasers(name, turn, near):
     log = read_log(str(data_file(name)), ReadingOptions(sweep=0.0))
-    assert measured(log, float(np.median(np.diff(log.times)))).turn == pytest.approx(turn, abs=near)
+    assert measured(log, float(np.median(np.diff(log.times)))).seconds == pytest.approx(turn, abs=near)

@@ -97,7 +97,7 @@ NEVER_ONE = {
     ("logs/text/corrected_poses.py", " records"): "a tag",
     ("logs/recordings/alternating_lasers.py", ALTERNATING): "two lasers alternate many times",
     ("logs/recordings/mcap.py", " messages on "): "so many of so many",
-    ("logs/recordings/turn_segments.py", " messages of "): "a turn in one message is whole",
+    ("logs/recordings/sweep_segments.py", " messages of "): "a turn in one message is whole",
     ("mapping/figures/match_plots.py", " scans, least overlap "): "of a joint match",
     ("slam/local_matching/joint_relations.py", " scans match each other"): "so many of so many",
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
-from nscan_cli.logs.recordings.turn_segments import TimedScan
+from nscan_cli.logs.recordings.sweep_segments import TimedScan
 from nscan_cli.poses import Array, Indices
 
 

@@ -24,9 +24,9 @@ from nscan_cli.logs.recordings.message_stamps import are_in_seconds, order_messa
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES
 from nscan_cli.logs.recordings.mounting import laser_mounting
 from nscan_cli.logs.recordings.robot_motion import ScanClock, robot_odometry
+from nscan_cli.logs.recordings.sweep_segments import TimedScan, joined_sweeps
 from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
-from nscan_cli.logs.recordings.turn_segments import TimedScan, joined_turns
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.sweep import RecordedSweep
 from nscan_cli.logs.text.line_records import MAX_ANGLE, beams_problem
@@ -86,7 +86,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
 
 def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:
     """The scans of one laser, each of a whole turn."""
-    turns, joined = joined_turns(timed)
+    turns, joined = joined_sweeps(timed)
     scans, left_out = first_of_two_lasers(turns)
     findings.contradictions += [said for said in (joined, left_out) if said]
     return scans

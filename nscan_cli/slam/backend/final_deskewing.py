@@ -1,7 +1,7 @@
 """Deskewing once more: scans of a turning laser are corrected by the path after the last optimisation.
 
-Tracking knows the motion during a turn from odometry, or from the scans before alone. The final path has
-poses on both sides of each turn, and more of them where the motion is uneven and odometry does not tell it.
+Tracking knows the motion during a sweep from odometry, or from the scans before alone. The final path has
+poses on both sides of each sweep, and more of them where the motion is uneven and odometry does not tell it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.robot_path import poses_at
 from nscan_cli.poses import Array, Mask, compose, inverse, relative
 from nscan_cli.slam.backend.scan_poses import between_keyframes
-from nscan_cli.slam.backend.uneven_motion import path_of_turns
+from nscan_cli.slam.backend.uneven_motion import path_of_sweeps
 from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.route import route_of
@@ -34,7 +34,7 @@ def deskew_by_final_path(state: SlamState) -> None:
     rows, breaks = state.route.rows, set(state.breaks)
     turn, tracked = state.options.optimisation.metres_per_radian, np.concatenate(state.tracked)
     at_middle = between_keyframes(tracked, rows, state.poses, state.breaks, turn)
-    path = path_of_turns(state.log, at_middle, state.breaks, state.options)
+    path = path_of_sweeps(state.log, at_middle, state.breaks, state.options)
     poses = at_middle if path is None else poses_at(path, state.recorded.times)
     since_middle = relative(poses, at_middle)
     before = state.keyframes.list

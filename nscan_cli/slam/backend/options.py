@@ -68,13 +68,13 @@ class UnevenMotionOptions:
 
     odometry_periods: float = 0.4
     """Odometry with poses at most so far apart, in the times from scan to scan, tells the motion within a
-    turn. A larger value believes coarser odometry."""
+    sweep. A larger value believes coarser odometry."""
     min_change: float = 0.05
-    """The motion is uneven if the way during one turn of the laser differs by more from that during the next,
-    m. A larger value takes less time, and leaves the poses between two turns less certain."""
+    """The motion is uneven if the way during one sweep of the laser differs by more from that during the
+    next, m. A larger value takes less time, and leaves the poses between two sweeps less certain."""
     min_turn_change: float = 0.04
-    """The motion is also uneven if the turns of the robot during two such turns differ by more, rad. A larger
-    value takes less time, and leaves the headings less certain."""
+    """The motion is also uneven if the turns of the robot during two such sweeps differ by more, rad. A
+    larger value takes less time, and leaves the headings less certain."""
     longest_step: float = 2.5
     """Longest step from scan to scan whose motion is known, in usual steps. A larger value believes more of
     them."""
@@ -85,7 +85,7 @@ class UnevenMotionOptions:
     """Largest number of scans in uneven motion that are matched together. More bend the path at fewer places,
     and leave it farther from what they are matched with."""
     parts: int = 4
-    """Number of parts of steady motion from the middle of one turn to the next. With more the moment when a
+    """Number of parts of steady motion from the middle of one sweep to the next. With more the moment when a
     turn of the robot begins is more exact, and it takes longer."""
     groups: int = 2
     """Number of groups of beams in each part, which are matched from where the robot was in their middle.
@@ -99,7 +99,7 @@ class UnevenMotionOptions:
     iterations: int = 8
     """Largest number of Newton steps in a stage. A larger number lets slow matches converge."""
     sigma: float = 0.05
-    """Standard deviation of the known places at the middles of the turns, m: it keeps matches from sliding
+    """Standard deviation of the known places at the middles of the sweeps, m: it keeps matches from sliding
     along walls. A larger value believes the beams more."""
     turn_sigma: float = 0.1
     """Standard deviation of the known headings there, rad. A larger value believes the beams more."""
@@ -110,7 +110,7 @@ class UnevenMotionOptions:
     """Least gain of the fit of the beams, in nats for each part, with which the path changes. A larger value
     changes less of it."""
     min_points: int = 50
-    """Least mean number of points in a turn of the laser with which the path changes. With a smaller number
+    """Least mean number of points in a sweep of the laser with which the path changes. With a smaller number
     blind lasers change it."""
     max_beams: int = 240
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take

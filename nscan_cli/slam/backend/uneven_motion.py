@@ -1,9 +1,9 @@
-"""The path between the middles of two turns of the laser, where the robot moves unevenly.
+"""The path between the middles of two sweeps of the laser, where the robot moves unevenly.
 
-The poses at the middles of the turns are known. If the robot begins to turn between two of them, steady
-motion from one to the next is off by some degrees there, and so is odometry with one pose a turn. The beams
-tell more: each part of a turn is matched with the scans before and after. A change of motion moves the points
-of all parts of a run of such scans. So these are matched at once, with the path between them.
+The poses at the middles of the sweeps are known. If the robot begins to turn between two of them, steady
+motion from one to the next is off by some degrees there, and so is odometry with one pose a sweep. The beams
+tell more: each part of a sweep is matched with the scans before and after. A change of motion moves the
+points of all parts of a run of such scans. So these are matched at once, with the path between them.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Mask, relative, wrap
 from nscan_cli.slam.backend.options import UnevenMotionOptions
-from nscan_cli.slam.backend.turn_energy import FIT, TimedPoints, TurnEnergy
+from nscan_cli.slam.backend.uneven_path_energy import FIT, TimedPoints, UnevenPathEnergy
 from nscan_cli.slam.options import SlamOptions
 
 
-def path_of_turns(
+def path_of_sweeps(
     log: LaserLog, poses: Array, breaks: Sequence[int], options: SlamOptions
 ) -> RobotPath | None:
-    """The path through poses (S, 3) at the middles of the turns, matched more finely where motion is uneven.
+    """The path through poses (S, 3) at the middles of the sweeps, matched more finely where motion is uneven.
 
     The scans of `log` are stamped at the middles; the track broke before those in rows `breaks`. Where
-    odometry tells the motion within a turn, it is believed. None of fewer than two scans.
+    odometry tells the motion within a sweep, it is believed. None of fewer than two scans.
     """
     path, uneven = log.moving_along(poses).path, options.uneven_motion
     if path is None or _is_fine(log, uneven):
@@ -129,11 +129,11 @@ class _Run:
     def match(self) -> bool:
         """Find the path on which the beams fit best; whether they tell it."""
         uneven, start = self._options.uneven_motion, self._knots
-        seen, turns = self._seen(), len(start) / uneven.parts
+        seen, sweeps = self._seen(), len(start) / uneven.parts
         beside = len(self._moving.times[self._near]) - (self._rows[1] + 1 - self._rows[0])
-        if beside < uneven.scans or len(seen.points) < uneven.min_points * turns:
+        if beside < uneven.scans or len(seen.points) < uneven.min_points * sweeps:
             return False
-        energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
+        energy = UnevenPathEnergy(self._reference(), seen, self._times, start, uneven)
         _, before = energy.least(start, uneven.widenings[-1], uneven.tolerance, 0)
         for widening in uneven.widenings:
             enough = uneven.tolerance if widening == uneven.widenings[-1] else uneven.coarse_tolerance

@@ -1,6 +1,6 @@
 """Deskewing while tracking without odometry: scans of a turning laser are corrected by the last step.
 
-Poses are those at the middle of each turn. During a turn the robot is assumed to go on as in the step between
+Poses are those at the middle of each sweep. During one the robot is assumed to go on as in the step between
 the last two: half a step before the middle, and half a step after it.
 """
 

@@ -33,7 +33,7 @@ class ScanBatch:
     odometry: Array | None
     """(n, 3) poses of the robot, or None."""
     shares: Array = field(default_factory=lambda: NONE)
-    """(P,) times of the points from the middle of the laser's turn, in periods of the scans, where tracking
+    """(P,) times of the points from the middle of the laser's sweep, in periods of the scans, where tracking
     is to correct them; else empty."""
 
     def __len__(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.poses import Array, wrap
-from nscan_cli.slam.backend.uneven_motion import path_of_turns
+from nscan_cli.slam.backend.uneven_motion import path_of_sweeps
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import turning
 from tests.simulation.drive import Drive
@@ -25,7 +25,7 @@ def drive() -> tuple[LaserLog, RobotPath]:
     """A robot that begins its turns from one moment to the next; the scans are at the middles of turns."""
     path = fine_path(office_way()[:WAY_POINTS], Drive(speed=0.22, turn_rate=RATE))
     log = record_swept("office", office_world(), path, turning(360, 3.5, 0.01, 0.01), Turning(), 1).log()
-    return dataclasses.replace(log, odometry=None, odometry_path=None).at_middle_of_turns(), path
+    return dataclasses.replace(log, odometry=None, odometry_path=None).at_middle_of_sweeps(), path
 
 
 def heading_errors(path: RobotPath | None, times: Array, true: RobotPath) -> Array:
@@ -40,7 +40,7 @@ def test_headings_between_the_middles_are_found_where_a_turn_begins():
     middles = poses_at(true, log.times)
     between = 0.5 * (log.times[1:] + log.times[:-1])
     steady = heading_errors(robot_path(log.times, middles), between, true)
-    finer = heading_errors(path_of_turns(log, middles, [], SlamOptions()), between, true)
+    finer = heading_errors(path_of_sweeps(log, middles, [], SlamOptions()), between, true)
     assert steady.max() > 4.0
     assert finer.max() < 0.5
     assert np.median(finer) < 0.1
@@ -51,7 +51,7 @@ def test_middles_that_are_off_there_are_matched_anew():
     middles = poses_at(true, log.times)
     turn = int(np.argmax(np.abs(np.diff(middles[:, 2])) > 0.1)) + 1
     middles[turn, 2] += 0.1
-    found = heading_errors(path_of_turns(log, middles, [], SlamOptions()), log.times, true)
+    found = heading_errors(path_of_sweeps(log, middles, [], SlamOptions()), log.times, true)
     assert found[turn] < 0.2
 
 
@@ -60,7 +60,7 @@ def test_scans_without_points_and_breaks_leave_the_path_as_it_is():
     middles, ranges = poses_at(true, log.times), np.full_like(log.ranges, np.inf)
     blind = dataclasses.replace(log, ranges=ranges)
     for each, breaks in ((blind, []), (log, list(range(1, len(log))))):
-        path = path_of_turns(each, middles, breaks, SlamOptions())
+        path = path_of_sweeps(each, middles, breaks, SlamOptions())
         assert path is not None
         np.testing.assert_allclose(poses_at(path, log.times)[:, :2], middles[:, :2], atol=1e-9)
 
@@ -79,7 +79,7 @@ def test_odometry_is_believed_unless_it_has_hardly_a_pose_a_turn():
     for period, is_kept in ((0.05, True), (0.2, False)):
         with_poses = with_odometry(log, true, period)
         told = with_poses.moving_along(middles).path
-        path = path_of_turns(with_poses, middles, [], SlamOptions())
+        path = path_of_sweeps(with_poses, middles, [], SlamOptions())
         assert path is not None
         assert told is not None
         assert np.array_equal(path.times, told.times) == is_kept
@@ -92,6 +92,6 @@ def test_the_path_stays_where_the_beams_fit_hardly_better():
     middles = poses_at(true, log.times)
     options = SlamOptions()
     uneven = dataclasses.replace(options.uneven_motion, min_gain=1e3)
-    path = path_of_turns(log, middles, [], dataclasses.replace(options, uneven_motion=uneven))
+    path = path_of_sweeps(log, middles, [], dataclasses.replace(options, uneven_motion=uneven))
     assert path is not None
     np.testing.assert_array_equal(path.times, log.times)

@@ -1,4 +1,4 @@
-"""The energy of a path along which a laser turns: how well its beams fit, and how steadily the robot moves.
+"""The energy of a path along which a laser sweeps: how well its beams fit, and how steadily the robot moves.
 
 The path is made of parts of steady motion from one knot to the next. The beams of a part are matched in
 groups, each group from where the robot was in its middle; its derivatives are shared out to the knots on both
@@ -37,7 +37,7 @@ class TimedPoints(NamedTuple):
     """(m,) s; increasing."""
 
 
-class TurnProblem(NamedTuple):
+class UnevenPathProblem(NamedTuple):
     """What the energy of K knots depends on."""
 
     grid: Grid
@@ -64,7 +64,7 @@ class TurnProblem(NamedTuple):
     speed (m/s) and turn rate (rad/s)."""
 
 
-class TurnSystem(NamedTuple):
+class UnevenPathSystem(NamedTuple):
     """The energy at some knots, and its derivatives."""
 
     terms: Array
@@ -75,7 +75,7 @@ class TurnSystem(NamedTuple):
     """(B, 3, 3) the semi-definite part, as the pattern has its blocks."""
 
 
-class TurnEnergy:
+class UnevenPathEnergy:
     """The energy of K ≥ 3 knots (x, y, φ), with φ that does not jump by 2π."""
 
     def __init__(
@@ -92,14 +92,14 @@ class TurnEnergy:
         ends = np.searchsorted(group, np.arange(groups * len(seconds) + 1))
         sigmas = np.array([options.sigma, options.turn_sigma, options.speed_change, options.turn_change])
         self.pattern = _band_pattern(len(times))
-        self._problem = TurnProblem(
+        self._problem = UnevenPathProblem(
             reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
             options.scale, sigmas,
         )  # fmt: skip
 
     def least(
         self, knots: Array, widening: float, tolerance: float, iterations: int
-    ) -> tuple[Array, TurnSystem]:
+    ) -> tuple[Array, UnevenPathSystem]:
         """The knots (K, 3) of least energy, by damped Newton steps from `knots` (K, 3) on, and the energy
         there.
 
@@ -107,7 +107,9 @@ class TurnEnergy:
         evaluates the energy at `knots`.
         """
         knots = knots.copy()
-        system = TurnSystem(np.empty(3), np.empty((len(knots), 3)), np.empty((len(self.pattern.rows), 3, 3)))
+        system = UnevenPathSystem(
+            np.empty(3), np.empty((len(knots), 3)), np.empty((len(self.pattern.rows), 3, 3))
+        )
         _descend(self._problem, self.pattern, knots, widening, tolerance, iterations, system)
         return knots, system
 
@@ -123,19 +125,19 @@ def _band_pattern(nodes: int) -> Pattern:
 
 @kernel
 def _descend(
-    problem: TurnProblem,
+    problem: UnevenPathProblem,
     pattern: Pattern,
     knots: Array,
     widening: float,
     tolerance: float,
     iterations: int,
-    here: TurnSystem,
+    here: UnevenPathSystem,
 ) -> None:
     """Minimise from the knots (K, 3), in place, after Levenberg and Marquardt. Writes the energy there.
 
     The pattern has the knots in order.
     """
-    there = TurnSystem(np.empty(3), np.empty_like(here.gradient), np.empty_like(here.hessian))
+    there = UnevenPathSystem(np.empty(3), np.empty_like(here.gradient), np.empty_like(here.hessian))
     damped, diagonal = np.empty_like(here.hessian), np.empty_like(knots)
     trial, damping = np.empty_like(knots), PAIRWISE_STEPS.first
     step, gathered = np.empty(knots.size), np.empty(knots.size)
@@ -171,7 +173,7 @@ def _descend(
 
 @kernel
 def _evaluate(
-    problem: TurnProblem, starts: Indices, knots: Array, widening: float, found: TurnSystem
+    problem: UnevenPathProblem, starts: Indices, knots: Array, widening: float, found: UnevenPathSystem
 ) -> None:
     """Write the energy at the knots (K, 3). `starts` (K + 1,) are those of the pattern's columns."""
     terms, gradient, hessian = found
@@ -233,7 +235,7 @@ def _seen_from_group(point: Array, share: float, step: Array, heading: float, ou
 
 @leaf_kernel
 def _add_change(
-    problem: TurnProblem, knots: Array, k: int, starts: Indices, gradient: Array, hessian: Array
+    problem: UnevenPathProblem, knots: Array, k: int, starts: Indices, gradient: Array, hessian: Array
 ) -> float:
     """Add what the change of the velocity at knot k costs; returns that."""
     before, after = 1.0 / problem.seconds[k - 1], 1.0 / problem.seconds[k]

@@ -1,7 +1,7 @@
-"""The angle between beams of a laser that sees a whole turn: walls go on from its last beam to its first.
+"""The angle between beams of a laser that sees all around: walls go on from its last beam to its first.
 
-Some drivers divide the turn by one beam too few, or are off by a percent. The beams then seem to overlap at
-the end, or to leave a gap, and walls have a step there.
+Some drivers divide the revolution by one beam too few, or are off by a percent. The beams then seem to
+overlap at the end, or to leave a gap, and walls have a step there.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class WholeTurnOptions:
-    """When beams cover a turn though the file has another angle between them."""
+class WholeRevolutionOptions:
+    """When beams cover a revolution though the file has another angle between them."""
 
     max_off: float = 0.15
-    """Largest difference of what the beams cover by the file from a turn, as a share. A larger value checks
-    more lasers."""
+    """Largest difference of what the beams cover by the file from a revolution, as a share. A larger value
+    checks more lasers."""
     min_off: float = math.radians(0.4)
-    """Least difference of what the beams cover by the file from a turn, rad. A smaller value checks more
-    lasers."""
+    """Least difference of what the beams cover by the file from a revolution, rad. A smaller value checks
+    more lasers."""
     width: float = math.radians(12.0)
     """Beams so far before the last and behind the first are taken for one wall, rad. A larger value needs
     wider walls, and tells more."""
     least_beams: int = 4
     """Least number of beams on each side. A larger value needs wider walls."""
     tried: float = math.radians(2.0)
-    """Gaps that differ from that of a turn by this and by twice as much must fit worse, rad. A larger value
-    checks less."""
+    """Gaps that differ from that of a revolution by this and by twice as much must fit worse, rad. A larger
+    value checks less."""
     on_wall: float = 0.012
     """Readings are of one wall if it explains them to within this share (RMS). A larger value takes more for
     walls."""
@@ -55,20 +55,20 @@ class WholeTurnOptions:
     """A scan tells which is right if the squared misfits differ by this factor. With a larger value fewer
     scans tell."""
     min_scans: int = 10
-    """Least number of scans that tell a turn. A larger value puts fewer logs right."""
+    """Least number of scans that tell a revolution. A larger value puts fewer logs right."""
     min_share: float = 0.9
     """Least share of these scans among all that tell. A larger value puts fewer logs right."""
 
 
-def in_whole_turns(
+def in_whole_revolutions(
     raw: RawScans,
     directions: BeamDirections,
     limits: RangeLimits,
     options: ReadingOptions,
-    checks: WholeTurnOptions = WholeTurnOptions(),
+    checks: WholeRevolutionOptions = WholeRevolutionOptions(),
     spacing: BeamSpacingOptions = BeamSpacingOptions(),
 ) -> tuple[BeamDirections, list[str]]:
-    """The directions of beams over one turn if walls show that they cover one; and the messages."""
+    """The directions of beams over one revolution if walls show that they cover one; and the messages."""
     beams = beam_counts(raw.ranges, raw.beams)
     count, step = int(beams[0]), float(np.median(directions.step))
     off = count * abs(step) - 2 * math.pi
@@ -78,30 +78,30 @@ def in_whole_turns(
         return directions, []
     rows = np.arange(0, len(beams), max(1, len(beams) // checks.max_scans))
     ranges = sampled_scans(raw, directions, limits, rows, spacing).ranges[:, :count]
-    turn = math.copysign(2 * math.pi / count, step)
+    whole = math.copysign(2 * math.pi / count, step)
     beside = np.arange(-2, 3) * checks.tried
-    gaps = [abs(step) - off, *(abs(turn) + beside).tolist()]
-    misfits = _misfits(ranges, abs(turn), gaps, checks)
-    by_log, by_turn = misfits[:, 0], misfits[:, 3]
-    told = int(np.count_nonzero(by_log > checks.min_gain * by_turn))
-    against = int(np.count_nonzero(by_turn > checks.min_gain * by_log))
+    gaps = [abs(step) - off, *(abs(whole) + beside).tolist()]
+    misfits = _misfits(ranges, abs(whole), gaps, checks)
+    by_log, by_whole = misfits[:, 0], misfits[:, 3]
+    told = int(np.count_nonzero(by_log > checks.min_gain * by_whole))
+    against = int(np.count_nonzero(by_whole > checks.min_gain * by_log))
     is_told = told >= max(checks.min_scans, checks.min_share * (told + against))
     if not is_told or misfits.mean(axis=0).argmin() != 3:
         return directions, []
     # A laser that looks ahead keeps its middle; others, their first direction.
     first, half = directions.first, 0.5 * (count - 1)
     if abs(2 * float(first[0]) + step * (count - 1)) < spacing.max_off_centre * abs(step):
-        first = first + half * (step - turn)
+        first = first + half * (step - whole)
     said = (
         f"{counted(count, 'beam')} with the {math.degrees(abs(step)):.5g}° of the log cover "
         f"{math.degrees(count * abs(step)):.1f}°, but walls go on from the last to the first as if it were "
-        f"one turn, in {counted(told, 'scan')}: {math.degrees(abs(turn)):.5g}° are used; --as-recorded "
+        f"one turn, in {counted(told, 'scan')}: {math.degrees(abs(whole)):.5g}° are used; --as-recorded "
         "leaves the beams as they are"
     )
-    return BeamDirections(first, np.full(len(beams), turn)), [said]
+    return BeamDirections(first, np.full(len(beams), whole)), [said]
 
 
-def _misfits(ranges: Array, step: float, gaps: list[float], checks: WholeTurnOptions) -> Array:
+def _misfits(ranges: Array, step: float, gaps: list[float], checks: WholeRevolutionOptions) -> Array:
     """(W, G) mean squares by which one wall misses the last and the first beams of W scans, as a share.
 
     `ranges` (N, B) are readings, m, `step` the angle from beam to beam, and `gaps` G angles from the last

@@ -1,4 +1,4 @@
-"""The turn of the laser as a log is read: how long it takes, and at which beam its scans are stamped."""
+"""The sweep of the laser as a log is read: how long it takes, and at which beam its scans are stamped."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from nscan_cli.logs.sweep import BEFORE_STAMP, beam_times
 from nscan_cli.poses import Array
 
 
-def sweep_turns(log: LaserLog) -> Array:
-    """(S,) the times of the turns, s, negative where the readings are in the reverse order; 0: at once."""
+def file_sweep_times(log: LaserLog) -> Array:
+    """(S,) the times of the sweeps, s, negative where the readings are in the reverse order; 0: at once."""
     if log.beam_times is None:
         return np.zeros(len(log))
     found: Array = log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
     return found
 
 
-def with_turns(log: LaserLog, turns: Array, stamp: str) -> LaserLog:
-    """The log of a laser whose turns take `turns` (S,), s, with its scans stamped at the beam `stamp`."""
-    return replace(log, beam_times=beam_times(turns, log.angle_increment, log.beam_counts(), stamp))
+def with_sweep_times(log: LaserLog, seconds: Array, stamp: str) -> LaserLog:
+    """The log of a laser whose sweeps take `seconds` (S,) each, and whose scans are stamped at `stamp`."""
+    return replace(log, beam_times=beam_times(seconds, log.angle_increment, log.beam_counts(), stamp))
 
 
-def usual_turn(log: LaserLog) -> float:
-    """The usual time of a turn, s; 0 if the file has none."""
-    return float(np.median(sweep_turns(log)))
+def usual_sweep_time(log: LaserLog) -> float:
+    """The usual time of a sweep, s; 0 if the file has none."""
+    return float(np.median(file_sweep_times(log)))
 
 
 def stamp_place(log: LaserLog, stamp: str, delay: float, options: SweepCheckOptions) -> str | None:
