@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration import findings, mount_findings
+from nscan_cli.calibration.clock_offset import ClockOffset, clock_offset
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
-from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
@@ -188,31 +188,31 @@ def _of_clocks(
     Few steps can agree at some offset by chance. So if an offset is likely, more steps are measured. Turns of
     mirrored scans are compared, too.
     """
-    tries = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
-    signs = [sign for sign, lag in tries if lag and _is_offset(lag, options.clock.first_gain, options)]
+    tries = [(sign, clock_offset(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
+    signs = [sign for sign, found in tries if found and _is_offset(found, options.clock.first_gain, options)]
     if not signs:
         return []
     rows = telling_steps(log, options.steps, options.more_steps)
     steps = measure_steps(log, rows, options.steps, known=known)
-    lags = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in signs]
+    offsets = [(sign, clock_offset(log, steps, options.clock, sign)) for sign in signs]
     told = [
-        (lag.disagreement, sign, lag)
-        for sign, lag in lags
-        if lag and _is_offset(lag, options.clock.gain, options)
+        (found.disagreement, sign, found)
+        for sign, found in offsets
+        if found and _is_offset(found, options.clock.gain, options)
     ]
     if not told:
         return []
-    _, sign, lag = min(told)
+    _, sign, best = min(told)
     if sign > 0.0:
-        return [findings.two_clocks(lag, reading)]
+        return [findings.two_clocks(best, reading)]
     evidence = "turns by odometry, at that offset, are those by scans the other way round"
-    return [findings.two_clocks(lag, reading), findings.opposite_turns(evidence, reading, False, False)]
+    return [findings.two_clocks(best, reading), findings.opposite_turns(evidence, reading, False, False)]
 
 
-def _is_offset(lag: ClockLag, gain: float, options: FileCheckOptions) -> bool:
-    is_better = lag.disagreement < gain * min(lag.as_stamped, lag.elsewhere)
-    is_better &= lag.disagreement <= options.clock.max_left
-    return is_better and abs(lag.offset) >= options.clock.min_offset
+def _is_offset(found: ClockOffset, gain: float, options: FileCheckOptions) -> bool:
+    is_better = found.disagreement < gain * min(found.as_stamped, found.elsewhere)
+    is_better &= found.disagreement <= options.clock.max_left
+    return is_better and abs(found.offset) >= options.clock.min_offset
 
 
 def _of_opposite_turns(

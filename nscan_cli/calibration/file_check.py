@@ -17,7 +17,7 @@ from nscan_cli.calibration.contradictions import changed_view, find_contradictio
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
-from nscan_cli.calibration.odometry_lag import checked_lag
+from nscan_cli.calibration.odometry_delay import checked_delay
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order
@@ -59,7 +59,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
     known: KnownSteps = {}
     findings = find_contradictions(signed, reading, options, known)
-    log, reading, late = checked_lag(log, reading, known, options)
+    log, reading, late = checked_delay(log, reading, known, options)
     if late:
         signed, reversing = checked_signs(log, options.unsigned, options.steps)
         findings = find_contradictions(signed, reading, options, known)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from nscan_cli.calibration.clock_offset import ClockOffset
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
-from nscan_cli.calibration.odometry_clock import ClockLag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange
 from nscan_cli.calibration.step_evidence import StepEvidence
@@ -89,13 +89,13 @@ def _unused(evidence: str) -> Finding:
     return Finding(f"{evidence}; it is not used; {UNDONE}", {"odometry": False})
 
 
-def two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
+def two_clocks(found: ClockOffset, reading: ReadingOptions) -> Finding:
     """Odometry is stamped by another clock."""
-    side = "behind" if lag.offset > 0 else "ahead of"
+    side = "behind" if found.offset > 0 else "ahead of"
     return Finding(
-        f"the clock of odometry is likely {abs(lag.offset):.1f} s {side} that of the scans: with this offset "
-        f"their turns differ by {lag.disagreement:.0%}, as stamped by {lag.as_stamped:.0%}; "
-        f"try --clock-offset {reading.clock_offset + lag.offset:.1f}",
+        f"the clock of odometry is likely {abs(found.offset):.1f} s {side} that of the scans: with this "
+        f"offset their turns differ by {found.disagreement:.0%}, as stamped by {found.as_stamped:.0%}; "
+        f"try --clock-offset {reading.clock_offset + found.offset:.1f}",
         is_of_clocks=True,
     )
 

@@ -1,7 +1,9 @@
-"""How late the odometry is against the scans of a laser that turns.
+"""How late the odometry is against the scans, by a tenth of a second or more, with any laser.
 
-Tracking hardly notices a delay of a tenth of a second. But beams that were measured while the robot began to
-turn would be corrected as if it stood, and the other way round.
+The steps that the check of a file measures tell it: their turns by scans fit best to those by odometry some
+time before or after. Where odometry is late, the robot still drives in it when it stands in the scans.
+sweep_delay.py finds shorter delays, by the sweeps of a turning laser; clock_offset.py looks for two clocks
+that differ by up to two minutes, of which a warning tells, or which `calibrate` measures.
 """
 
 from __future__ import annotations
@@ -10,68 +12,70 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.calibration.file_sweep import usual_sweep_time
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.odometry_options import DelayOptions
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
-from nscan_cli.calibration.scan_motion import ScanMotion
-from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
-from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import Array, Indices, are_known
 
 
-def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
-    """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt.
+def checked_delay(
+    log: LaserLog, reading: ReadingOptions, known: KnownSteps, options: FileCheckOptions
+) -> tuple[LaserLog, ReadingOptions, list[str]]:
+    """The log with the delay of its odometry put right, the options that read it so, and messages.
 
-    Only a part of the scans in turns is matched if these fit hardly better with any delay.
+    More steps are measured only if those that are `known` show a delay.
     """
-    path, measured = log.odometry_path, dict[int, float]()
-    if log.odometry is None or path is None or log.beam_times is None:
+    if log.odometry is None or reading.clock_offset:
+        return log, reading, []
+    rows = np.array([pair for pair, step in known.items() if step is not None], dtype=np.int64).reshape(-1, 2)
+    turned = np.array([step[0][2] for step in known.values() if step is not None])
+    if not _delay(log, rows[:, 0], rows[:, 1], turned, options.lag, options.lag.first_sigmas):
+        return log, reading, []
+    steps = measure_steps(
+        log, telling_steps(log, options.steps, options.more_steps), options.steps, known=known
+    )
+    delay = _delay(log, steps.first, steps.last, steps.laser[:, 2], options.lag, options.lag.sigmas)
+    if not delay:
+        return log, reading, []
+    reading = replace(reading, clock_offset=delay)
+    return with_delay(log, delay), reading, [said_late(delay, delay, "because scans are matched by odometry")]
+
+
+def _delay(
+    log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions, sigmas: float
+) -> float:
+    """Seconds to add to the stamps of odometry, so that its turns fit those (n,) of the steps from rows to
+    rows (n,); 0 in doubt: with a mean gain of fewer standard deviations than `sigmas`."""
+    assert log.odometry is not None
+    at, headings = log.times, log.odometry[:, 2]
+    if log.odometry_path is not None:
+        at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
+    is_known, turns = np.isfinite(headings), np.abs(turned) >= options.min_turn
+    if np.count_nonzero(turns) < options.min_turns or not is_known.any():
         return 0.0
-    rows, sweep, delay = _turning(motion, options), usual_sweep_time(log), 0.0
-    for part in (rows[::4], rows[2::4], rows[1::2]):
-        found = {row: motion.turned(row, sweep) for row in part}
-        measured.update({row: turned for row, turned in found.items() if turned is not None})
-        turns = np.array(list(measured.values()))
-        count = np.count_nonzero(np.abs(turns) > options.min_winding)
-        if count >= options.few_delay_turns:
-            delay, gain = _best_delay(log, path, np.array(list(measured)), turns, options)
-            if gain > options.no_delay_gain:
-                return 0.0
-            if count < options.min_delay_turns and gain > options.few_delay_gain:
-                delay = 0.0
-    return delay
-
-
-def _best_delay(
-    log: LaserLog, path: RobotPath, rows: Indices, turned: Array, options: SweepCheckOptions
-) -> tuple[float, float]:
-    """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
-
-    Also returns the disagreement with it as a share of that without it.
-    """
-    times, headings = log.middle_times, np.unwrap(path.poses[:, 2])
-    count = round(options.longest_delay / options.delay_step)
-    delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
-    steps = times[rows - 1], times[rows + 1]
-    off = turn_differences((path.times, headings), steps, turned, delays).mean(axis=1)
-    best = int(np.argmin(off))
-    gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
-    # At an end of the range the best one may lie beyond.
-    if best in (0, 2 * count) or gain > options.delay_gain:
-        return 0.0, gain
-    delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
-    return (delay if abs(delay) >= options.least_delay else 0.0), gain
-
-
-def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
-    """Rows of scans in turns, evenly among them."""
-    rows = motion.spread_rows(options, options.scans)
-    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
-    rows = rows[turned > options.min_winding]
-    used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
-    return used
+    known = at[is_known], np.unwrap(headings[is_known])
+    count = round(options.longest / options.step)
+    delays = options.step * np.arange(-count, count + 1, dtype=np.float64)
+    steps, turned = (log.middle_times[first[turns]], log.middle_times[last[turns]]), turned[turns]
+    # A match that failed, or a wheel that slipped, counts for no more than another turn.
+    off = np.minimum(turn_differences(known, steps, turned, delays), options.max_difference)
+    total = off.mean(axis=1)
+    best = int(np.argmin(total))
+    gains = off[count] - off[best]
+    sigma = float(gains.std(ddof=1)) / np.sqrt(len(gains))
+    whole = float(np.minimum(np.abs(turned), options.max_difference).mean())
+    is_clear = total[best] <= min(options.max_left * total[count], options.max_disagreement * whole)
+    if best in (0, 2 * count) or not is_clear or gains.mean() < sigmas * sigma:
+        return 0.0
+    delay = round(parabola_minimum(delays, total, options.fitted), 2)
+    return delay if abs(delay) >= options.least else 0.0
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:

@@ -37,15 +37,15 @@ class ClockOptions:
 
 
 @dataclass(frozen=True)
-class LagOptions:
-    """When the odometry of a laser that sees at once is late or early."""
+class DelayOptions:
+    """When odometry is late or early, by the steps of any laser."""
 
     longest: float = 1.5
-    """Longest lag that is looked for, s. A larger value takes longer."""
+    """Longest delay that is looked for, s. A larger value takes longer."""
     step: float = 0.02
-    """Interval between the lags that are tried, s. A smaller value takes longer."""
+    """Interval between the delays that are tried, s. A smaller value takes longer."""
     least: float = 0.2
-    """Smallest lag that is corrected, s. Tracking hardly notices a smaller one. A larger value leaves the
+    """Smallest delay that is corrected, s. Tracking hardly notices a smaller one. A larger value leaves the
     file as it is more often."""
     min_turn: float = 0.05
     """Least turn of a step that counts, rad. With a larger value fewer steps count, and each tells more."""
@@ -55,18 +55,18 @@ class LagOptions:
     """Turns of a step that differ by more count as different by this, rad. A larger value gives slips and
     failed matches more weight."""
     max_left: float = 0.7
-    """A lag is found if turns disagree by at most this share of their disagreement without it. A larger value
-    finds lags more often, also where there is none."""
+    """A delay is found if turns disagree by at most this share of their disagreement without it. A larger
+    value finds delays more often, also where there is none."""
     max_disagreement: float = 0.5
-    """Largest disagreement of the turns with the lag, as a share of the turns by scans. Where odometry turns
-    the wrong way, they disagree less with any lag. A larger value finds more."""
+    """Largest disagreement of the turns with the delay, as a share of the turns by scans. Where odometry
+    turns the wrong way, they disagree less with any delay. A larger value finds more."""
     sigmas: float = 4.0
-    """Least mean gain of the turns with the lag, in its standard deviations. A larger value finds less."""
+    """Least mean gain of the turns with the delay, in its standard deviations. A larger value finds less."""
     first_sigmas: float = 1.3
     """More steps are measured where the first few gain so much: of ten times as many, the gain is three times
     as clear. A larger value takes less time, and finds less."""
     fitted: int = 3
-    """Number of lags on each side of the best one that a parabola fits. With more the curve is less like a
+    """Number of delays on each side of the best one that a parabola fits. With more the curve is less like a
     parabola."""
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.odometry_options import (
     ClockOptions,
+    DelayOptions,
     HeldOdometryOptions,
-    LagOptions,
     OdometryUnitOptions,
     ScaleChangeOptions,
     UnsignedOdometryOptions,
@@ -84,8 +84,8 @@ class FileCheckOptions:
     """Which steps are measured, and which measurements count."""
     clock: ClockOptions = field(default_factory=ClockOptions)
     """How the offset between the clocks of odometry and scans is looked for."""
-    lag: LagOptions = field(default_factory=LagOptions)
-    """When the odometry of a laser that sees at once is late or early."""
+    lag: DelayOptions = field(default_factory=DelayOptions)
+    """When odometry is late or early, by the steps of any laser."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     """How the time of a laser's sweep is taken from its scans."""
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)

@@ -1,6 +1,6 @@
 """What an ordinary drive says about the robot: laser, odometry and clocks, each with a standard deviation.
 
-The mounting and the scale follow in closed form from the steps (mount_fit.py), the lag of the clocks from
+The mounting and the scale follow in closed form from the steps (mount_fit.py), the offset of the clocks from
 their turns by Gauss-Newton steps, the ratio of the turns and the heading that is gained per metre from the
 turns of chains of steps. All fits are robust against slips.
 """
@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nscan_cli.calibration.clock_offset import clock_offset
 from nscan_cli.calibration.estimate import Estimate, estimate, left_open
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, fit_mount
-from nscan_cli.calibration.odometry_clock import clock_lag
 from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
 from nscan_cli.calibration.step_chains import chains
@@ -174,11 +174,11 @@ class _Drive:
         if not self.turns_enough:
             return left_open(0.0, 0.0, HARDLY_TURNS), False, HARDLY_TURNS
         options, gain = self.options.clock, self.options.clock.gain
-        lag, other = (clock_lag(self.log, self.steps, options, sign) for sign in (1.0, -1.0))
-        assert lag is not None
+        plain, other = (clock_offset(self.log, self.steps, options, sign) for sign in (1.0, -1.0))
+        assert plain is not None
         assert other is not None
-        mirrored = other.disagreement < gain * lag.disagreement
-        best = other if mirrored else lag
+        mirrored = other.disagreement < gain * plain.disagreement
+        best = other if mirrored else plain
         is_told = best.disagreement < gain * best.elsewhere
         offset, left = self._clock_fit(best.offset if is_told else 0.0, mirrored)
         if left > self.options.max_turn_spread:
@@ -194,10 +194,10 @@ class _Drive:
         for _ in range(self.options.clock_iterations):
             told = self.odometry(offset)[used, 2]
             # A later clock of odometry tells at a time what was before.
-            by_lag = self._turn_rates(self._ends[used] - offset) - self._turn_rates(
+            by_offset = self._turn_rates(self._ends[used] - offset) - self._turn_rates(
                 self._begins[used] - offset
             )
-            rows = np.stack([turns, self.length[used], by_lag], axis=1) / expected[:, None]
+            rows = np.stack([turns, self.length[used], by_offset], axis=1) / expected[:, None]
             fit = robust_fit(rows[:, None, :], (told / expected)[:, None])
             # Rates hold near their time only.
             limit = self.options.clock.resolution

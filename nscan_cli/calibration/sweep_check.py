@@ -8,9 +8,10 @@ import numpy as np
 
 from nscan_cli.calibration.calibrated_reading import DECIMALS
 from nscan_cli.calibration.file_sweep import file_sweep_times, stamp_place, usual_sweep_time, with_sweep_times
-from nscan_cli.calibration.odometry_delay import odometry_delay, said_late, with_delay
+from nscan_cli.calibration.odometry_delay import said_late, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_delay import sweep_delay
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
 from nscan_cli.calibration.sweep_time import sweep_time
 from nscan_cli.files.text import counted
@@ -48,7 +49,7 @@ def checked_sweep(
         reading = replace(reading, sweep=round(sweep, DECIMALS) + 0.0)
         log = with_sweep_times(log, np.full(len(log), reading.sweep), reading.stamp)
         said.append(_said(evidence, told, sweep, certainty))
-    delay = odometry_delay(log, motion, options.sweep)
+    delay = sweep_delay(log, motion, options.sweep)
     if delay:
         log, reading, late = _without_delay(log, reading, delay, options)
         said.append(late)

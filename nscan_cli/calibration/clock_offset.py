@@ -1,4 +1,8 @@
-"""The offset of odometry's clock from that of the scans: the lag at which their turns agree best."""
+"""The offset of odometry's clock from that of the scans: the one with which their turns agree best.
+
+It may be as long as two minutes, as where two computers recorded; a warning names it, and `calibrate` refines
+it. odometry_delay.py and sweep_delay.py find delays up to 1.5 s, which are put right.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from nscan_cli.poses import are_known
 
 
 @dataclass(frozen=True)
-class ClockLag:
+class ClockOffset:
     """The offset that makes turns by odometry agree best with those by scans."""
 
     offset: float
@@ -28,9 +32,9 @@ class ClockLag:
     """Median of this share over all offsets: that of turns that have nothing in common."""
 
 
-def clock_lag(
+def clock_offset(
     log: LaserLog, steps: MeasuredSteps, options: ClockOptions, turn_sign: float = 1.0
-) -> ClockLag | None:
+) -> ClockOffset | None:
     """The best offset within half of the log's length, to about a tenth of the resolution.
 
     None without turns. `turn_sign` −1 compares with the turns of mirrored scans.
@@ -53,4 +57,4 @@ def clock_lag(
     best = int(np.argmin(off))
     is_inside = 0 < best < len(off) - 1
     offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])
-    return ClockLag(offset, float(off[best]), float(off[count]), float(np.median(off)))
+    return ClockOffset(offset, float(off[best]), float(off[count]), float(np.median(off)))

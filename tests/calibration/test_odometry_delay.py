@@ -10,7 +10,7 @@ import pytest
 
 from nscan_cli.calibration.file_check import CheckedFile, checked_file
 from nscan_cli.calibration.odometry_delay import with_delay
-from nscan_cli.calibration.odometry_options import LagOptions
+from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -45,7 +45,7 @@ def test_no_lag_is_found_where_there_is_none_or_nobody_asks():
     assert checked(log).messages == []
     late = odometry_faults.late(log, 0.6)
     assert checked_file(late, ReadingOptions(as_recorded=True), FileCheckOptions()).messages == []
-    never = replace(FileCheckOptions(), lag=LagOptions(least=np.inf))
+    never = replace(FileCheckOptions(), lag=DelayOptions(least=np.inf))
     assert not [said for said in checked(late, never).messages if said.startswith("odometry is stamped")]
     backwards = odometry_faults.turning(log, -1.0)
     assert not [said for said in checked(backwards).messages if said.startswith("odometry is stamped")]

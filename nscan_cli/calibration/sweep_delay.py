@@ -1,0 +1,72 @@
+"""How late the odometry is against the scans of a laser that turns, to a hundredth of a second.
+
+Tracking hardly notices a delay of a tenth of a second. But beams that were measured while the robot began to
+turn would be corrected as if it stood, and the other way round. odometry_delay.py finds longer delays with
+any laser, by the steps of the check; clock_offset.py looks for two clocks that differ by up to two minutes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.calibration.file_sweep import usual_sweep_time
+from nscan_cli.calibration.parabola import parabola_minimum
+from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.turn_differences import turn_differences
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import RobotPath
+from nscan_cli.poses import Array, Indices
+
+
+def sweep_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
+    """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt.
+
+    Only a part of the scans in turns is matched if these fit hardly better with any delay.
+    """
+    path, measured = log.odometry_path, dict[int, float]()
+    if log.odometry is None or path is None or log.beam_times is None:
+        return 0.0
+    rows, sweep, delay = _turning(motion, options), usual_sweep_time(log), 0.0
+    for part in (rows[::4], rows[2::4], rows[1::2]):
+        found = {row: motion.turned(row, sweep) for row in part}
+        measured.update({row: turned for row, turned in found.items() if turned is not None})
+        turns = np.array(list(measured.values()))
+        count = np.count_nonzero(np.abs(turns) > options.min_winding)
+        if count >= options.few_delay_turns:
+            delay, gain = _best_delay(log, path, np.array(list(measured)), turns, options)
+            if gain > options.no_delay_gain:
+                return 0.0
+            if count < options.min_delay_turns and gain > options.few_delay_gain:
+                delay = 0.0
+    return delay
+
+
+def _best_delay(
+    log: LaserLog, path: RobotPath, rows: Indices, turned: Array, options: SweepCheckOptions
+) -> tuple[float, float]:
+    """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
+
+    Also returns the disagreement with it as a share of that without it.
+    """
+    times, headings = log.middle_times, np.unwrap(path.poses[:, 2])
+    count = round(options.longest_delay / options.delay_step)
+    delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
+    steps = times[rows - 1], times[rows + 1]
+    off = turn_differences((path.times, headings), steps, turned, delays).mean(axis=1)
+    best = int(np.argmin(off))
+    gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
+    # At an end of the range the best one may lie beyond.
+    if best in (0, 2 * count) or gain > options.delay_gain:
+        return 0.0, gain
+    delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
+    return (delay if abs(delay) >= options.least_delay else 0.0), gain
+
+
+def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
+    """Rows of scans in turns, evenly among them."""
+    rows = motion.spread_rows(options, options.scans)
+    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
+    rows = rows[turned > options.min_winding]
+    used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
+    return used
