@@ -1,4 +1,4 @@
-"""The uncertainty of a match, from its Hessian."""
+"""The uncertainty of a match from its Hessian. It serves pairwise and joint matches alike."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""ROS 2 bags in SQLite (.db3); their metadata.yaml is not needed."""
+"""ROS 2 bags in SQLite (.db3): one file of a bag.
+
+A bag's folder and its metadata.yaml are read in logs/log_files.py. A file alone is read without them.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 A robot that is lifted and put down elsewhere sees what no match with the local map explains. The tracker
 takes the best match all the same. The views of two scans from nearly the same place give it away.
+Here are the tests; segment_tracker.py takes the final decision, after the scans behind the doubted one.
 """
 
 from __future__ import annotations
