@@ -175,7 +175,7 @@ def _of_whole(facts: dict[str, Any]) -> list[Row]:
 
 
 def _turn(log: LaserLog, stamp: str) -> dict[str, Any] | None:
-    """The usual time of a turn of the laser as --sweep takes it, s; None if all beams are seen at once."""
+    """The usual time of a sweep of the laser as --sweep takes it, s; None if all beams are seen at once."""
     import numpy as np
 
     if log.beam_times is None:

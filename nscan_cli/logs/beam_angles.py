@@ -71,7 +71,7 @@ def _steps(raw: RawScans, warnings: list[str], checks: BeamAngleOptions) -> Arra
     """The steps (S,) from beam to beam, corrected if first and last direction and the walls contradict them.
 
     Other programs use the step, so that a wrong step is noticed sooner than a wrong last direction. The step
-    is wrong if walls are straighter with that of the last direction, or if it alone exceeds a whole turn.
+    is wrong if walls are straighter with that of the last direction, or if it alone exceeds a revolution.
     """
     steps = raw.angle_increment
     if raw.angle_max is None:

@@ -42,7 +42,7 @@ class ReadingOptions:
     """Sectors of beams that are not read: two bearings in the laser's frame each, from the first
     counter-clockwise to the second, rad."""
     sweep: float | None = None
-    """Time that a whole turn of the laser takes, s: beams are seen one after another. Negative if the
+    """Time that a sweep of the laser takes, s: beams are seen one after another. Negative if the
     readings are in the reverse order of time; 0: all are seen at once."""
     stamp: str = "first"
     """Beam at whose time a scan is stamped: first, middle or last of the scan."""

@@ -1,4 +1,4 @@
-"""The time of a laser's turn as its scans measure it."""
+"""The time of a laser's sweep as its scans measure it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def measured(log: LaserLog, longest: float = PERIOD) -> SweepTime:
 
 @functools.cache
 def by_scans(turn: float, rate: float) -> SweepTime:
-    """Of a drive with turns at a rate (rad/s) whose file says nothing of the laser's turn (s)."""
+    """Of a drive with turns at a rate (rad/s) whose file says nothing of the laser's sweep (s)."""
     path = fine_path(office_way()[:12], Drive(speed=0.22, turn_rate=rate))
     laser = turning(360, 3.5, 0.01, 0.01)
     return measured(

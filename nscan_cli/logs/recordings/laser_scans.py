@@ -85,7 +85,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
 
 
 def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:
-    """The scans of one laser, each of a whole turn."""
+    """The scans of one laser, each of a whole sweep."""
     turns, joined = joined_sweeps(timed)
     scans, left_out = first_of_two_lasers(turns)
     findings.contradictions += [said for said in (joined, left_out) if said]

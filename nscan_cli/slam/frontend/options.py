@@ -213,7 +213,7 @@ class TrackingOptions:
     and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05. With a larger share fewer lasers
     have a range limit."""
     whole_turn_beams: int = 4
-    """A laser sees all around if at most this many beams are missing to a whole turn. With a larger number
+    """A laser sees all around if at most this many beams are missing to a revolution. With a larger number
     fewer lasers are matched sector by sector."""
     first_scan_path: float = 5.0
     """Length of the path whose scans place the first scan of a track segment, m. A larger value is more exact
