@@ -95,7 +95,7 @@ def _stage(
             assign_rows(hessian, trial_hessian)
         if accepted or factor == 1.0:
             damping = next_damping(damping, accepted, JOINT_STEPS)
-        if iterations > JOINT_STEPS.unstretched:
+        if settings.stretched and iterations > JOINT_STEPS.unstretched:
             stretch = next_stretch(slope, factor, gain, JOINT_STEPS)
         if converged or damping > JOINT_STEPS.greatest:
             break

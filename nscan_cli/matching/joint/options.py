@@ -115,6 +115,8 @@ class DescentSettings(NamedTuple):
     """Most iterations in a stage."""
     thorough: bool
     """Whether energy and derivatives are evaluated after the last step too, rather than before it."""
+    stretched: bool
+    """As in JointOptions."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,9 @@ class JointOptions:
     """The match has converged when no pose moves by more, m and rad. A larger value ends it earlier."""
     thorough: bool = True
     """Whether energy and derivatives are evaluated after the last step too, rather than before it."""
+    stretched: bool = False
+    """Whether slow descents take longer steps. They also bring scans together that do not belong together, so
+    not where a loop is to be found."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
     inlier_bound: float = 9.0
@@ -169,9 +174,11 @@ class JointOptions:
     @property
     def approach(self) -> DescentSettings:
         """What the stages of an approach take of these."""
-        return DescentSettings(self.stride, gauge_of(self.fixed), self.approach_iterations, self.thorough)
+        return DescentSettings(
+            self.stride, gauge_of(self.fixed), self.approach_iterations, self.thorough, self.stretched
+        )
 
     @property
     def last_stage(self) -> DescentSettings:
         """What the last stage takes of these."""
-        return DescentSettings(1, gauge_of(self.fixed), self.max_iterations, self.thorough)
+        return DescentSettings(1, gauge_of(self.fixed), self.max_iterations, self.thorough, self.stretched)

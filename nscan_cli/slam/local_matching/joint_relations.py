@@ -111,7 +111,7 @@ def match_at(
     found = []
     for start in starts:
         problem = _problem(scans, members, route, options)
-        match = match_jointly(problem, start[members], _stages(options.widenings, options))
+        match = match_jointly(problem, start[members], _stages(options.widenings, options, False))
         found.append((match.energy, compose(held, relative(match.poses[at], match.poses[old]))))
     return found
 
@@ -146,7 +146,8 @@ def _match_held(
         if len(related) < len(scans.usual):
             scans = _laid_out(keyframes, related)
         problem = _problem(scans, related, route, options)
-        match = match_jointly(problem, start, _stages(widenings, options))
+        one_visit = not from_other_visit[kept].any()
+        match = match_jointly(problem, start, _stages(widenings, options, one_visit))
         at = int(related.searchsorted(centre))
         held, score = connectivity(scans, match.poses, options.inlier_bound, options.min_overlap, at)
         if not held.all():
@@ -191,13 +192,14 @@ def _problem(scans: ScanSet, members: Indices, route: Route, options: NScanOptio
     return JointProblem(scans, all_pairs(len(members)), priors, scale)
 
 
-def _stages(widenings: tuple[float, ...], options: NScanOptions) -> JointOptions:
+def _stages(widenings: tuple[float, ...], options: NScanOptions, one_visit: bool) -> JointOptions:
     return JointOptions(
         widenings,
         near=options.wide_tolerance,
         stride=options.thinning if len(widenings) == 1 else JointOptions.stride,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
+        stretched=one_visit,
         # The last step is shorter than a millimetre: its end need not be looked at.
         thorough=False,
     )
