@@ -85,13 +85,13 @@ def laser_log(
     motion: RecordedMotion,
     findings: ReaderFindings,
     options: ReadingOptions,
-    file: str,
     checks: ScanCheckOptions = SCAN_CHECKS,
 ) -> LaserLog:
     """The selected scans in order of time, with no-returns marked. `raw.ranges` may be overwritten.
 
     Raises WrongUsageError if the options select no scan.
     """
+    file = findings.skips.file
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings, of_file = findings.warnings, len(findings.warnings)

@@ -43,6 +43,5 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     mount = np.array(options.mount or (0.0, 0.0, 0.0))
     findings.used |= {"laser": "the only laser", "mounting": "the robot's centre", "odometry": "the columns"}
     raw = RawScans(ranges, *half_turn, stamps, (0.0, 80.0))
-    return laser_log(
-        source, "CSV", "the laser", raw, times, mount, RecordedMotion(odometry), findings, options, file
-    )
+    motion = RecordedMotion(odometry)
+    return laser_log(source, "CSV", "the laser", raw, times, mount, motion, findings, options)

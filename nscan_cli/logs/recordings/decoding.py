@@ -1,18 +1,18 @@
-"""Decoders: the bytes of a message → a scan or stamped transforms, for every encoding."""
+"""Decoding: the bytes of a message → a scan or stamped transforms, for every encoding."""
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterator, Sequence
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any
 
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.recordings.container import Channel
+from nscan_cli.logs.recordings.container import Channel, Message
 from nscan_cli.logs.recordings.decoded_messages import (
     Pose3D,
     ScanMessage,
@@ -22,8 +22,8 @@ from nscan_cli.logs.recordings.decoded_messages import (
 )
 from nscan_cli.logs.recordings.frame_ids import normalised
 from nscan_cli.logs.recordings.message_types import TRANSFORM_TYPES
+from nscan_cli.logs.skips import Skips
 
-T = TypeVar("T")
 UNREADABLE_DEFINITION = (TypesysError, KeyError, ValueError, IndexError, AttributeError, TypeError, NameError,
                          AssertionError, RecursionError)  # fmt: skip
 """Errors that a damaged definition can raise."""
@@ -41,33 +41,34 @@ UNDECODABLE = (SerdeError, ValueError, IndexError, KeyError, TypeError, Attribut
 """Errors that decoding a damaged message can raise; protobuf's own error becomes a ValueError."""
 
 
-def scan_decoder(channel: Channel, file: str) -> Callable[[bytes], ScanMessage]:
-    """The decoder of a channel with scans. Raises InputDataError when its encoding or schema is unknown."""
-    return _decoder(channel, file, _foxglove().scan if _is_foxglove(channel) else _ros_scan)
+def decoded(
+    messages: Sequence[Message], topic: str, types: Container[str], skips: Skips
+) -> Iterator[tuple[int, int, Any]]:
+    """Number (from 1), log time (ns) and content of the messages of some types on a topic.
+
+    The content is a ScanMessage, or a list of StampedTransforms. Messages of other types, and those that
+    cannot be decoded, are skipped. Raises InputDataError when an encoding or a schema is unknown.
+    """
+    decoders = {one: _decoder(one, skips.file) for one in dict.fromkeys(each.channel for each in messages)}
+    for number, message in enumerate(messages, 1):
+        try:
+            if message.channel.type not in types:
+                raise TypeError
+            content = decoders[message.channel](message.data)
+        except UNDECODABLE:
+            skips.add(f"{topic}: cannot be decoded", number)
+        else:
+            yield number, message.log_time, content
 
 
-def transform_decoder(channel: Channel, file: str) -> Callable[[bytes], list[StampedTransform]]:
-    """The decoder of a channel with odometry, transforms or poses. Raises as scan_decoder does."""
-    if _is_foxglove(channel):
-        return _decoder(channel, file, _foxglove().CONVERTERS[channel.type])
-    convert = ROS_CONVERTERS.get(channel.type.rpartition("/")[2], _ros_transforms)
-    return _decoder(channel, file, convert)
+def _decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
+    if channel.type.startswith("foxglove."):
+        # It is imported only for recordings that have such messages.
+        from nscan_cli.logs.recordings.foxglove import CONVERTERS, foxglove_decoder
 
-
-def _is_foxglove(channel: Channel) -> bool:
-    return channel.type.startswith("foxglove.")
-
-
-def _foxglove() -> Any:
-    """The module for Foxglove's messages, imported only for recordings that have some."""
-    from nscan_cli.logs.recordings import foxglove
-
-    return foxglove
-
-
-def _decoder(channel: Channel, file: str, convert: Callable[[Any], T]) -> Callable[[bytes], T]:
-    """A decoder of the encoding, then a conversion of the message object."""
-    decode = _foxglove().decoder(channel, file) if _is_foxglove(channel) else _ros_decoder(channel, file)
+        convert, decode = CONVERTERS[channel.type], foxglove_decoder(channel, file)
+    else:
+        convert, decode = ROS_CONVERTERS[channel.type.rpartition("/")[2]], _ros_decoder(channel, file)
     return lambda data: convert(decode(data))
 
 
@@ -136,7 +137,7 @@ def _parsed_schema(name: str, schema_encoding: str, schema: bytes) -> Any:
 
 
 def _ros_scan(message: Any) -> ScanMessage:
-    """sensor_msgs/LaserScan; its stamp is the time of the first beam."""
+    """The stamp is the time of the first beam."""
     header, ranges, step = message.header, message.ranges, message.angle_increment
     if step == 0 and len(ranges) > 1:
         step = (message.angle_max - message.angle_min) / (len(ranges) - 1)
@@ -156,19 +157,15 @@ def _ros_scan(message: Any) -> ScanMessage:
 
 
 def _ros_odometry(message: Any) -> list[StampedTransform]:
-    """nav_msgs/Odometry"""
     pose = message.pose.pose
     return [_stamped_transform(message.header, message.child_frame_id, pose.position, pose.orientation)]
 
 
 def _ros_transforms(message: Any) -> list[StampedTransform]:
-    """tf2_msgs/TFMessage"""
-    parts: Iterable[Any] = message.transforms
-    return [transform for part in parts for transform in _ros_transform(part)]
+    return [transform for part in message.transforms for transform in _ros_transform(part)]
 
 
 def _ros_transform(message: Any) -> list[StampedTransform]:
-    """geometry_msgs/TransformStamped"""
     transform = message.transform
     return [
         _stamped_transform(message.header, message.child_frame_id, transform.translation, transform.rotation)
@@ -176,24 +173,26 @@ def _ros_transform(message: Any) -> list[StampedTransform]:
 
 
 def _ros_pose(message: Any) -> list[StampedTransform]:
-    """geometry_msgs/PoseStamped and PoseWithCovarianceStamped"""
+    # That of PoseWithCovarianceStamped is one deeper.
     pose = getattr(message.pose, "pose", message.pose)
     return [_stamped_transform(message.header, "", pose.position, pose.orientation)]
 
 
 def _ros_path(message: Any) -> list[StampedTransform]:
-    """nav_msgs/Path"""
     return [transform for pose in message.poses for transform in _ros_pose(pose)]
 
 
-ROS_CONVERTERS: Mapping[str, Callable[[Any], list[StampedTransform]]] = {
+ROS_CONVERTERS: dict[str, Callable[[Any], Any]] = {
+    "LaserScan": _ros_scan,
     "Odometry": _ros_odometry,
     "TransformStamped": _ros_transform,
     "PoseStamped": _ros_pose,
     "PoseWithCovarianceStamped": _ros_pose,
     "Path": _ros_path,
+    "TFMessage": _ros_transforms,
+    "tfMessage": _ros_transforms,
 }
-"""Conversions by the name of the type; _ros_transforms converts the types that are not listed."""
+"""Conversions by the name of the type, of which `decoded` gives the results."""
 
 
 def _stamped_transform(header: Any, child: str, translation: Any, rotation: Any) -> StampedTransform:

@@ -28,7 +28,7 @@ JSON_OBJECTS = ("timestamp", "pose", "position", "orientation", "translation", "
 """Fields that are objects, not numbers."""
 
 
-def decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
+def foxglove_decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
     """The decoder of a channel; objects from JSON have the same attributes as those from protobuf.
 
     Raises InputDataError when the encoding is neither of them, or the schema cannot be read.
@@ -40,8 +40,8 @@ def decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
     raise unknown_encoding(channel, file)
 
 
-def scan(message: Any) -> ScanMessage:
-    """foxglove.LaserScan: beams from start_angle to end_angle, both included, without range limits."""
+def _scan(message: Any) -> ScanMessage:
+    """Beams from start_angle to end_angle, both included, without range limits."""
     # JSON has null for an invalid range; NumPy turns it into nan.
     ranges = np.array(message.ranges, dtype=np.float64)
     if ranges.ndim != 1:
@@ -54,34 +54,32 @@ def scan(message: Any) -> ScanMessage:
     return ScanMessage(_timestamp(message), frame, first, step or 1.0, 0.0, math.inf, ranges, pose)
 
 
-def odometry(message: Any) -> list[StampedTransform]:
-    """foxglove.Odometry"""
+def _odometry(message: Any) -> list[StampedTransform]:
     at, rotation = message.pose.position, message.pose.orientation
     return [_stamped_pose(message, message.frame_id, message.body_frame_id, at, rotation)]
 
 
-def pose_in_frame(message: Any) -> list[StampedTransform]:
-    """foxglove.PoseInFrame"""
+def _pose_in_frame(message: Any) -> list[StampedTransform]:
     return [_stamped_pose(message, message.frame_id, "", message.pose.position, message.pose.orientation)]
 
 
-def frame_transform(message: Any) -> list[StampedTransform]:
-    """foxglove.FrameTransform"""
+def _frame_transform(message: Any) -> list[StampedTransform]:
     parent, child = message.parent_frame_id, message.child_frame_id
     return [_stamped_pose(message, parent, child, message.translation, message.rotation)]
 
 
-def frame_transforms(message: Any) -> list[StampedTransform]:
-    """foxglove.FrameTransforms"""
-    return [transform for part in message.transforms for transform in frame_transform(part)]
+def _frame_transforms(message: Any) -> list[StampedTransform]:
+    return [transform for part in message.transforms for transform in _frame_transform(part)]
 
 
-CONVERTERS: Mapping[str, Callable[[Any], list[StampedTransform]]] = {
-    "foxglove.Odometry": odometry,
-    "foxglove.PoseInFrame": pose_in_frame,
-    "foxglove.FrameTransform": frame_transform,
-    "foxglove.FrameTransforms": frame_transforms,
+CONVERTERS: Mapping[str, Callable[[Any], Any]] = {
+    "foxglove.LaserScan": _scan,
+    "foxglove.Odometry": _odometry,
+    "foxglove.PoseInFrame": _pose_in_frame,
+    "foxglove.FrameTransform": _frame_transform,
+    "foxglove.FrameTransforms": _frame_transforms,
 }
+"""Conversions by type, to what decoding.decoded gives."""
 
 
 class _JsonObject:

@@ -19,7 +19,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
 from nscan_cli.logs.recordings.container import Message, Recording
 from nscan_cli.logs.recordings.decoded_messages import S, ScanMessage, decimal_seconds
-from nscan_cli.logs.recordings.decoding import UNDECODABLE, scan_decoder
+from nscan_cli.logs.recordings.decoding import decoded
 from nscan_cli.logs.recordings.message_stamps import are_in_seconds, order_messages, valid_stamps
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES
 from nscan_cli.logs.recordings.mounting import laser_mounting
@@ -49,7 +49,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
     messages, twice = without_copies(recording.messages.get(choice.topic, []), lambda each: each.data)
     findings.warnings += [twice] if twice else []
-    scans, log_times = _decoded_scans(messages, choice.topic, skips, file)
+    scans, log_times = _decoded_scans(messages, choice.topic, skips)
     stamps = valid_stamps([scan.stamp for scan in scans])
     use_stamps = order_messages(stamps) and are_in_seconds(stamps)
     if not use_stamps:
@@ -62,26 +62,16 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     raw = _raw_scans(scans, [decimal_seconds(stamp) for stamp in stamps])
     times = order.by_time(raw.stamps)
     findings.warnings += times.warnings
-    tree = TransformTree(recording, skips, file)
+    tree = TransformTree(recording, skips)
     clock = ScanClock(times, use_stamps, _recording_delay(stamps, log_times))
-    motion = robot_odometry(recording, tree, clock, options, findings, file)
-    mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings, file)
+    motion = robot_odometry(tree, clock, options, findings)
+    mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings)
     findings.frames = distinct_frame_names(scans[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
         # Seen from above, the beams of a laser that is upside down run clockwise.
         raw = raw.mirrored()
-    return laser_log(
-        source,
-        recording.form,
-        choice.topic,
-        raw,
-        times,
-        mount,
-        RecordedMotion(motion.poses, path=motion.path),
-        findings,
-        options,
-        file,
-    )
+    recorded = RecordedMotion(motion.poses, path=motion.path)
+    return laser_log(source, recording.form, choice.topic, raw, times, mount, recorded, findings, options)
 
 
 def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:
@@ -93,31 +83,23 @@ def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[
 
 
 def _decoded_scans(
-    messages: Sequence[Message], topic: str, skips: Skips, file: str
+    messages: Sequence[Message], topic: str, skips: Skips
 ) -> tuple[list[ScanMessage], list[int]]:
     """The scans that can be decoded and share the frame of the first, and when they were recorded (ns)."""
-    decoders = {
-        channel: scan_decoder(channel, file) for channel in dict.fromkeys(m.channel for m in messages)
-    }
     scans: list[ScanMessage] = []
     log_times: list[int] = []
-    for number, message in enumerate(messages, 1):
-        try:
-            scan = decoders[message.channel](message.data)
-            problem = _scan_problem(scan)
-        except UNDECODABLE:
-            problem = f"{topic}: cannot be decoded"
+    for number, log_time, scan in decoded(messages, topic, SCAN_TYPES, skips):
+        problem = _scan_problem(scan)
         if not problem and scans and scan.frame != scans[0].frame:
             problem = f"{topic}: a scan in another frame than {scans[0].frame}"
         if problem:
             skips.add(problem, number)
-            continue
-        scans.append(scan)
-        log_times.append(message.log_time)
+        else:
+            scans.append(scan)
+            log_times.append(log_time)
     if not scans:
-        reason = next(iter(skips.reasons), "there is none")
-        raise InputDataError(file, f"no scan of {topic} can be read: {reason}",
-                             "give a recording with whole messages")  # fmt: skip
+        problem = f"no scan of {topic} can be read: {next(iter(skips.reasons), 'there is none')}"
+        raise InputDataError(skips.file, problem, "give a recording with whole messages")
     return scans, log_times
 
 

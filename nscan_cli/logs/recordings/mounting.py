@@ -34,7 +34,6 @@ def laser_mounting(
     tree: TransformTree,
     options: ReadingOptions,
     findings: ReaderFindings,
-    file: str,
 ) -> tuple[Array, bool, str]:
     """The laser's pose on the robot (3,), whether it is upside down, and the robot's frame if it is known.
 
@@ -45,7 +44,8 @@ def laser_mounting(
     if options.mount is not None:
         findings.used["mounting"] = "--mount"
         return np.array(options.mount, dtype=np.float64), False, robot
-    links, frames, how = _laser_chain(tree, robot, scans[0].frame, file)
+    file = tree.skips.file
+    links, frames, how = _laser_chain(tree, robot, scans[0].frame)
     if frames is None:
         findings.used["mounting"] = "assumed: at the robot's centre"
         findings.warnings.append(f"{how}: the laser is taken as at the robot's centre; see --mount")
@@ -72,7 +72,7 @@ def laser_mounting(
 
 
 def _laser_chain(
-    tree: TransformTree, robot: str, laser: str, file: str
+    tree: TransformTree, robot: str, laser: str
 ) -> tuple[list[ChainLink], list[str] | None, str]:
     """The transforms from the robot's frame to the laser's, the frames, and which these are in words.
 
@@ -93,7 +93,7 @@ def _laser_chain(
     links = chain_links(frames, tree.fixed, moving)
     mount = moving_mount(links)
     if mount is not None and mount.nods:
-        raise _moving_laser(mount, links, frames, file)
+        raise _moving_laser(mount, links, frames, tree.skips.file)
     scans = laser or "the unnamed frame of the scans"
     if not robot and not tree.fixed and not moving:
         return [], None, f"the recording has no transforms, so none lead to {scans}"

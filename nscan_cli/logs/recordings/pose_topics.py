@@ -30,7 +30,7 @@ def poses_on_topic(
     """
     name, frames = _topic_and_frames(recording, topic, file)
     skips = Skips(file, strict=False, place="message")
-    rows = list(decoded_transforms(recording, name, skips, file))
+    rows = list(decoded_transforms(recording, name, skips))
     transforms = [transform for transform, _ in rows]
     if frames or len({(one.parent, one.child) for one in transforms}) > 1:
         pair = _frame_pair(transforms, frames, f"{file}: {name}")

@@ -11,7 +11,6 @@ from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.device_choice import Device, OpenChoiceError
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, ODOM_FRAMES, without_prefix
 from nscan_cli.logs.recordings.message_stamps import are_in_seconds
@@ -27,7 +26,6 @@ from nscan_cli.logs.recordings.tf_tree import (
 from nscan_cli.logs.recordings.topics import devices, find_topic, odometry_topic
 from nscan_cli.logs.robot_path import RobotPath, robot_path
 from nscan_cli.logs.scan_order import ScanOrder
-from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 
@@ -55,12 +53,7 @@ class RobotMotion(NamedTuple):
 
 
 def robot_odometry(
-    recording: Recording,
-    tree: TransformTree,
-    clock: ScanClock,
-    options: ReadingOptions,
-    findings: ReaderFindings,
-    file: str,
+    tree: TransformTree, clock: ScanClock, options: ReadingOptions, findings: ReaderFindings
 ) -> RobotMotion:
     """The robot's motion from the topic that --odom-topic names, from the only one, or from tf.
 
@@ -68,18 +61,18 @@ def robot_odometry(
     """
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
-        return RobotMotion(None, None, _robot_frame(recording, tree, findings.skips, file), "")
-    asked = options.odom_topic
+        return RobotMotion(None, None, _robot_frame(tree), "")
+    recording, asked = tree.recording, options.odom_topic
     is_frame = (
         asked is not None and find_topic(asked, devices(recording, ODOMETRY_TYPES + TRANSFORM_TYPES)) is None
     )
     by_frame = _transforms_from_odom(tree) if is_frame else {}
-    choice = None if asked in by_frame else odometry_topic(recording, options, file)
+    choice = None if asked in by_frame else odometry_topic(recording, options, tree.skips.file)
     if choice is not None:
-        rows = list(decoded_transforms(recording, choice.topic, findings.skips, file))
+        rows = list(decoded_transforms(recording, choice.topic, tree.skips))
         source, why = choice.topic, choice.why
     else:
-        rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree, file)
+        rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if asked is None else f"{asked} is asked for"
     poses, path = _poses_at_scans(rows, source or "tf", clock, options, findings)
@@ -95,21 +88,21 @@ def robot_odometry(
     return RobotMotion(poses, path, rows[0][0].child, rows[0][0].parent)
 
 
-def _robot_frame(recording: Recording, tree: TransformTree, skips: Skips, file: str) -> str:
+def _robot_frame(tree: TransformTree) -> str:
     """The child frame of the odometry; empty where there is none, or topics name different ones."""
-    topics = recording.topics_of(ODOMETRY_TYPES)
+    topics = tree.recording.topics_of(ODOMETRY_TYPES)
     if topics:
-        first = [next(decoded_transforms(recording, topic, skips, file), None) for topic in topics]
+        first = [next(decoded_transforms(tree.recording, topic, tree.skips), None) for topic in topics]
         frames = {logged[0].child for logged in first if logged is not None}
         return frames.pop() if len(frames) == 1 else ""
     try:
-        rows = _odometry_in_tf(tree, file)
+        rows = _odometry_in_tf(tree)
     except OpenChoiceError:
         return ""
     return rows[0][0].child if rows else ""
 
 
-def _odometry_in_tf(tree: TransformTree, file: str) -> list[LoggedTransform]:
+def _odometry_in_tf(tree: TransformTree) -> list[LoggedTransform]:
     """The transforms from odom to the robot.
 
     Raises OpenChoiceError when odom has several child frames that may be the robot.
@@ -119,7 +112,7 @@ def _odometry_in_tf(tree: TransformTree, file: str) -> list[LoggedTransform]:
     robots = bases if len(bases) == 1 else list(by_frame)
     if len(robots) > 1:
         found = [Device(frame, f"tf from {rows[0][0].parent}", len(rows)) for frame, rows in by_frame.items()]
-        raise OpenChoiceError(file, "odometry", found, "--odom-topic", "transform")
+        raise OpenChoiceError(tree.skips.file, "odometry", found, "--odom-topic", "transform")
     return by_frame[robots[0]] if robots else []
 
 

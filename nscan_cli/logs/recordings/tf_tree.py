@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import StampedTransform
-from nscan_cli.logs.recordings.decoding import UNDECODABLE, transform_decoder
+from nscan_cli.logs.recordings.decoding import decoded
 from nscan_cli.logs.recordings.message_stamps import valid_stamps
-from nscan_cli.logs.recordings.message_types import TRANSFORM_TYPES
+from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES
 from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, as_matrix
 from nscan_cli.logs.skips import Skips
@@ -24,8 +24,8 @@ LoggedTransform = tuple[StampedTransform, int]
 class TransformTree:
     """The transforms of a recording. Topics called tf_static are read at once, the others when needed."""
 
-    def __init__(self, recording: Recording, skips: Skips, file: str) -> None:
-        self.recording, self.skips, self.file = recording, skips, file
+    def __init__(self, recording: Recording, skips: Skips) -> None:
+        self.recording, self.skips = recording, skips
         self.fixed: dict[FramePair, Array] = {}
         """Pose (4, 4) of the child in the parent, of pairs of frames that are fixed to each other."""
         self._dynamic: list[LoggedTransform] | None = None
@@ -66,25 +66,15 @@ class TransformTree:
     def _read(self, static: bool) -> Iterator[LoggedTransform]:
         for topic in self.recording.topics_of(TRANSFORM_TYPES):
             if topic.rpartition("/")[2].startswith(STATIC) == static:
-                yield from decoded_transforms(self.recording, topic, self.skips, self.file)
+                yield from decoded_transforms(self.recording, topic, self.skips)
 
 
-def decoded_transforms(
-    recording: Recording, topic: str, skips: Skips, file: str
-) -> Iterator[LoggedTransform]:
+def decoded_transforms(recording: Recording, topic: str, skips: Skips) -> Iterator[LoggedTransform]:
     """All transforms on a topic of odometry, tf or poses; messages that cannot be decoded are skipped."""
     messages = recording.messages.get(topic, [])
-    decoders = {
-        channel: transform_decoder(channel, file) for channel in dict.fromkeys(m.channel for m in messages)
-    }
-    for number, message in enumerate(messages, 1):
-        try:
-            transforms = decoders[message.channel](message.data)
-        except UNDECODABLE:
-            skips.add(f"{topic}: cannot be decoded", number)
-            continue
+    for _number, log_time, transforms in decoded(messages, topic, REFERENCE_TYPES, skips):
         for transform in transforms:
-            yield transform, message.log_time
+            yield transform, log_time
 
 
 def transform_times(rows: Sequence[LoggedTransform]) -> list[int | None]:

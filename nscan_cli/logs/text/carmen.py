@@ -103,7 +103,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     )
     odometry = _odometry(tag, scans, times, by_logger, lines, options, findings)
     motion = RecordedMotion(odometry, *_true_poses(lines, by_logger, skips, warnings))
-    return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options, file)
+    return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options)
 
 
 def _scan_order(

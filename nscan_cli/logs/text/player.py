@@ -81,10 +81,9 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     times = order.by_time(scans.raw.stamps)
     findings.warnings += times.warnings
     mount = _player_mount(laser, lines, options, findings)
-    motion = RecordedMotion(_odometry(scans, lines, times, options, findings, file))
-    return laser_log(
-        source, VERSION_NAMES[version], laser, scans.raw, times, mount, motion, findings, options, file
-    )
+    motion = RecordedMotion(_odometry(scans, lines, times, options, findings))
+    form = VERSION_NAMES[version]
+    return laser_log(source, form, laser, scans.raw, times, mount, motion, findings, options)
 
 
 def _begin_at_zero(scans: PlayerScans) -> bool:
@@ -134,7 +133,6 @@ def _odometry(
     times: order.ScanOrder,
     options: ReadingOptions,
     findings: ReaderFindings,
-    file: str,
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: those in the scans, else those of a position device."""
     used = findings.used
@@ -147,7 +145,7 @@ def _odometry(
         poses[:, 2] = wrap(poses[:, 2])
         used["odometry"] = "the poses in the scans (1:2)"
         return odometry_of_scans(times, poses, options, findings)
-    device, why = choose_device("odometry", options.odom_topic, findings.odometries, file)
+    device, why = choose_device("odometry", options.odom_topic, findings.odometries, findings.skips.file)
     found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
     values, stamps = player_records.device_poses(found, findings.skips)
     recorded = order.by_time(stamps)

@@ -68,7 +68,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     mount = np.array(options.mount or (0.0, 0.0, 0.0), dtype=np.float64)
     findings.used["mounting"] = "--mount" if options.mount else "assumed: at the robot's centre"
     motion = RecordedMotion(_odometry(records, times, options, findings))
-    return laser_log(source, ".script", laser, raw, times, mount, motion, findings, options, file)
+    return laser_log(source, ".script", laser, raw, times, mount, motion, findings, options)
 
 
 def _records_by_tag(data: bytes, skips: Skips) -> ScriptRecords:
