@@ -91,18 +91,12 @@ class ReadingOptions:
         if self.start is not None and self.end is not None and self.start > self.end:
             raise WrongUsageError("--start is after --end; no scan lies between")
 
-    def refuse_topic(self, file: str, form: str, instead: str) -> None:
-        """Raises WrongUsageError if --topic is given for a log of `form`, whose lasers are no topics."""
-        self._refuse("--topic", self.topic, file, form, instead)
-
-    def refuse_topics(self, file: str, form: str, instead: str) -> None:
-        """Raises WrongUsageError if any topic is given for a log of `form`, which has none."""
-        self.refuse_topic(file, form, instead)
-        self._refuse("--odom-topic", self.odom_topic, file, form, instead)
-
-    def _refuse(self, option: str, value: str | None, file: str, form: str, instead: str) -> None:
-        if value is not None:
-            raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")
+    def refuse_topics(self, file: str, form: str, instead: str, of_odometry: bool = True) -> None:
+        """Raises WrongUsageError if a topic, also one `of_odometry`, is given for a log of `form`."""
+        odometry = self.odom_topic if of_odometry else None
+        for option, value in (("--topic", self.topic), ("--odom-topic", odometry)):
+            if value is not None:
+                raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")
 
 
 def sectors_from(text: str) -> tuple[tuple[float, float], ...]:

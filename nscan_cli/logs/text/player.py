@@ -57,7 +57,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     Raises InputDataError if there is no readable scan, and WrongUsageError if the options do not fit the log
     or must choose between devices.
     """
-    options.refuse_topic(file, "a Player log", "--laser laser:0")
+    options.refuse_topics(file, "a Player log", "--laser laser:0", of_odometry=False)
     version = _version(data)
     assert version is not None
     skips = Skips(file, options.strict)
