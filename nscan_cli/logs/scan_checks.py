@@ -18,7 +18,7 @@ from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
 from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
-from nscan_cli.logs.recordings.mounting_options import MountingOptions
+from nscan_cli.logs.recordings.moving_mount import MountingOptions
 from nscan_cli.logs.recordings.orientations import OrientationOptions
 from nscan_cli.logs.recordings.sweep_segments import SweepSegmentOptions
 from nscan_cli.logs.repeated_reading import RepeatedReadingOptions

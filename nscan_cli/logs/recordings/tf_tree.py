@@ -9,7 +9,7 @@ from nscan_cli.logs.recordings.decoded_messages import StampedTransform
 from nscan_cli.logs.recordings.decoding import decoded
 from nscan_cli.logs.recordings.message_stamps import valid_stamps
 from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES
-from nscan_cli.logs.recordings.mounting_options import MountingOptions
+from nscan_cli.logs.recordings.moving_mount import MountingOptions
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, as_matrix
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
