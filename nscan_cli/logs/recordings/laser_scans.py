@@ -41,15 +41,15 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     """
     if options.laser is not None:
         raise WrongUsageError(f"{file}: has topics, no lasers by tag; leave out --laser, see --topic")
-    choice = scan_topic(recording, options, file)
+    topic, why = scan_topic(recording, options, file)
     skips = Skips(file, options.strict, place="message")
     findings = ReaderFindings(skips, recording.topic_counts(), recording.warnings)
-    findings.used = {"laser": choice.why, "checksums": recording.checksums}
+    findings.used = {"laser": why, "checksums": recording.checksums}
     findings.lasers, findings.laser_option = tuple(devices(recording, SCAN_TYPES)), "--topic"
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
-    messages, twice = without_copies(recording.messages.get(choice.topic, []), lambda each: each.data)
+    messages, twice = without_copies(recording.messages.get(topic, []), lambda each: each.data)
     findings.warnings += [twice] if twice else []
-    scans, log_times = _decoded_scans(messages, choice.topic, skips)
+    scans, log_times = _decoded_scans(messages, topic, skips)
     stamps = valid_stamps([scan.stamp for scan in scans])
     use_stamps = order_messages(stamps) and are_in_seconds(stamps)
     if not use_stamps:
@@ -71,7 +71,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         # Seen from above, the beams of a laser that is upside down run clockwise.
         raw = raw.mirrored()
     recorded = RecordedMotion(motion.poses, path=motion.path)
-    return laser_log(source, recording.form, choice.topic, raw, times, mount, recorded, findings, options)
+    return laser_log(source, recording.form, topic, raw, times, mount, recorded, findings, options)
 
 
 def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:

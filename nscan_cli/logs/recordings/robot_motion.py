@@ -69,8 +69,8 @@ def robot_odometry(
     by_frame = _transforms_from_odom(tree) if is_frame else {}
     choice = None if asked in by_frame else odometry_topic(recording, options, tree.skips.file)
     if choice is not None:
-        rows = list(decoded_transforms(recording, choice.topic, tree.skips))
-        source, why = choice.topic, choice.why
+        source, why = choice
+        rows = list(decoded_transforms(recording, source, tree.skips))
     else:
         rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.device_choice import Device, OpenChoiceError, device_list
@@ -12,49 +11,37 @@ from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES, TRANSFORM_TYPES
 
 
-@dataclass(frozen=True)
-class TopicChoice:
-    """A topic, and why it is used."""
-
-    topic: str
-    why: str
-
-
-def scan_topic(recording: Recording, options: ReadingOptions, file: str) -> TopicChoice:
-    """The topic of the scans.
+def scan_topic(recording: Recording, options: ReadingOptions, file: str) -> tuple[str, str]:
+    """The topic of the scans, and why it is used.
 
     Raises InputDataError when there is none, WrongUsageError when the one that the user names has no scans,
     and OpenChoiceError when there are several and the user names none.
     """
     there = devices(recording, SCAN_TYPES)
     if options.topic is not None:
-        asked = find_topic(options.topic, there)
-        if asked is None:
-            raise _no_such_topic(recording, "--topic", options.topic, there, file)
-        return TopicChoice(asked, "chosen by --topic")
+        return _asked_topic(recording, "--topic", options.topic, there, file), "chosen by --topic"
     if not there:
         found = ", ".join(recording.topic_counts()) or "nothing"
         known = " or ".join(SCAN_TYPES)
         raise InputDataError(file, f"has no laser scans, only {found}", f"give a recording with {known}")
     if len(there) > 1:
         raise OpenChoiceError(file, "laser", there, "--topic", "message")
-    return TopicChoice(there[0].name, "the only topic with scans")
+    return there[0].name, "the only topic with scans"
 
 
-def odometry_topic(recording: Recording, options: ReadingOptions, file: str) -> TopicChoice | None:
-    """The topic of the odometry; None when it has to be searched for in tf.
+def odometry_topic(recording: Recording, options: ReadingOptions, file: str) -> tuple[str, str] | None:
+    """The topic of the odometry, and why it is used; None when it has to be searched for in tf.
 
     Raises WrongUsageError and OpenChoiceError as scan_topic does.
     """
     there, transforms = devices(recording, ODOMETRY_TYPES), devices(recording, TRANSFORM_TYPES)
     if options.odom_topic is not None:
-        asked = find_topic(options.odom_topic, [*there, *transforms])
-        if asked is None:
-            raise _no_such_topic(recording, "--odom-topic", options.odom_topic, [*there, *transforms], file)
-        return None if find_topic(asked, transforms) else TopicChoice(asked, "chosen by --odom-topic")
+        both = [*there, *transforms]
+        asked = _asked_topic(recording, "--odom-topic", options.odom_topic, both, file)
+        return None if find_topic(asked, transforms) else (asked, "chosen by --odom-topic")
     if len(there) > 1:
         raise OpenChoiceError(file, "odometry", there, "--odom-topic", "message")
-    return TopicChoice(there[0].name, "the only topic with odometry") if there else None
+    return (there[0].name, "the only topic with odometry") if there else None
 
 
 def devices(recording: Recording, types: tuple[str, ...]) -> list[Device]:
@@ -77,8 +64,9 @@ def type_problem(recording: Recording, topic: str) -> str:
     return f"{topic} is of {types[0]}" if types else f"has no topic {topic}"
 
 
-def _no_such_topic(
-    recording: Recording, option: str, topic: str, there: Sequence[Device], file: str
-) -> WrongUsageError:
-    known = device_list(there, "message") or "left out"
-    return WrongUsageError(f"{file}: {type_problem(recording, topic)}; {option} can be {known}")
+def _asked_topic(recording: Recording, option: str, topic: str, there: Sequence[Device], file: str) -> str:
+    found = find_topic(topic, there)
+    if found is None:
+        known = device_list(there, "message") or "left out"
+        raise WrongUsageError(f"{file}: {type_problem(recording, topic)}; {option} can be {known}")
+    return found
