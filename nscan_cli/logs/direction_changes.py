@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.logs.beam_angles import BeamDirections
 from nscan_cli.logs.robot_parts import ScanTable, ranges_at
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Indices
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
     """
     last, gains = len(table.rows) - 1, []
     for one, other in ((place - 1, place), (max(place - 2, 0), place), (place - 1, min(place + 1, last))):
-        by_number, by_file = _directions_at(table, one), _directions_at(table, other)
+        by_number, by_file = table.bearings(table.rows[one]), table.bearings(table.rows[other])
         seen = ranges_at(table, np.array([other]), by_file)[0]
         # The robot may turn meanwhile, by less than what is to be told.
         change = float(np.abs(by_file - by_number)[[0, -1]].max())
@@ -135,13 +135,6 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
         ]
         gains.append(shares[0] - shares[1])
     return min(gains) if min(gains) > 0.0 else max(gains)
-
-
-def _directions_at(table: ScanTable, place: int) -> Array:
-    """(B,) the directions of the scan at a place in order of time, rad."""
-    row = table.rows[place]
-    found: Array = table.angle_min[row] + table.angle_increment[row] * np.arange(table.ranges.shape[1])
-    return found
 
 
 def _same_share(

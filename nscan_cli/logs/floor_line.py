@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.beam_mask import Bearings, in_sectors
-from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, evenly, ranges_at, turned_pairs
+from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, evenly, ranges_at, turning_scans
 from nscan_cli.poses import Array, Mask
 
 
@@ -92,11 +92,10 @@ def floor_line(
 ) -> FloorLine | None:
     """The line of the floor in the scans of a log, outside some sectors; None if they show none, or the robot
     never turns."""
-    first, step = float(table.angle_min[table.rows[0]]), float(table.angle_increment[table.rows[0]])
-    beams = table.ranges.shape[1]
-    every = int(np.clip(np.round(options.step / max(abs(step), 1e-12)), 1, max(beams, 1)))
-    spacing = every * abs(step)
-    bearings = np.sort(first + step * np.arange(0, beams, every))
+    step = abs(float(table.angle_increment[table.rows[0]]))
+    every = int(np.clip(np.round(options.step / max(step, 1e-12)), 1, max(table.ranges.shape[1], 1)))
+    spacing = every * step
+    bearings = np.sort(table.bearings(table.rows[0])[::every])
     bearings = bearings[~in_sectors(bearings, sectors)]
     ranges = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
     line = _fitted(ranges, bearings, spacing, options)
@@ -107,10 +106,9 @@ def floor_line(
     without_floor(without, table.angle_min, table.angle_increment, line, options)
     rest = table._replace(ranges=without)
     nothing: Mask = np.zeros(len(bearings), dtype=np.bool_)
-    pairs = turned_pairs(rest, bearings, nothing, parts)
-    if len(pairs) < parts.min_pairs:
+    turning = turning_scans(rest, bearings, nothing, parts)
+    if not len(turning):
         return None
-    turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], parts.scans_of_turn).astype(np.int64))
     seen = ranges_at(table, turning, bearings)
     return line if _ends_views(line, seen, bearings, spacing, options) else None
 

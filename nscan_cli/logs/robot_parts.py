@@ -99,18 +99,23 @@ class ScanTable(NamedTuple):
     times: Array
     """(S,) in order, s."""
 
+    def bearings(self, row: int) -> Array:
+        """(B,) directions of the beams of a scan in file order, rad."""
+        found: Array = self.angle_min[row] + self.angle_increment[row] * np.arange(self.ranges.shape[1])
+        return found
+
 
 def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
     """The sectors in which the robot itself is in view, by increasing bearing; none if it never turns."""
-    bearings = _bearings(table)
+    # Increasing ones, of the scan with the finest step.
+    bearings = np.sort(table.bearings(int(np.argmin(np.abs(table.angle_increment)))))
     some = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
     constant, medians = _constant_beams(some, options)
     if not constant.any():
         return []
-    pairs = turned_pairs(table, bearings, constant, options)
-    if len(pairs) < options.min_pairs:
+    turning = turning_scans(table, bearings, constant, options)
+    if not len(turning):
         return []
-    turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], options.scans_of_turn).astype(np.int64))
     ranges = ranges_at(table, turning, bearings)
     constant &= _kept(ranges, medians, options).mean(axis=0) >= options.min_turning_share
     return _sectors(bearings, constant, medians, options.margin)
@@ -119,13 +124,6 @@ def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
 def evenly(size: int, most: int) -> NDArray[np.int64]:
     """At most `most` places, spread evenly over `size`."""
     return np.unique(np.linspace(0, size - 1, most).astype(np.int64))
-
-
-def _bearings(table: ScanTable) -> Array:
-    """(B,) increasing bearings of the beams of the scan with the finest step, rad."""
-    row = int(np.argmin(np.abs(table.angle_increment)))
-    found: Array = table.angle_min[row] + table.angle_increment[row] * np.arange(table.ranges.shape[1])
-    return found if table.angle_increment[row] > 0 else found[::-1]
 
 
 def ranges_at(table: ScanTable, places: NDArray[np.int64], bearings: Array) -> NDArray[np.float32]:
@@ -172,10 +170,10 @@ def _kept(
     return kept
 
 
-def turned_pairs(
+def turning_scans(
     table: ScanTable, bearings: Array, constant: NDArray[np.bool_], options: RobotPartsOptions
 ) -> NDArray[np.int64]:
-    """Places (P, 2) of two scans each, between which the other beams show a turn of the robot."""
+    """Places (n,) of scans in which the other beams show a turn of the robot; none if it turns too seldom."""
     found = []
     for lag in options.lags:
         first = evenly(len(table.times), options.pairs)
@@ -184,7 +182,10 @@ def turned_pairs(
         pairs = np.stack([first[inside], second[inside]], axis=1)
         turns = _turns(table, bearings, constant, pairs, options)
         found.append(pairs[np.abs(turns) >= options.min_turn])
-    return np.concatenate(found)
+    first, last = np.concatenate(found).T
+    if len(first) < options.min_pairs:
+        return np.zeros(0, dtype=np.int64)
+    return np.unique(np.linspace(first, last, options.scans_of_turn).astype(np.int64))
 
 
 def _turns(
