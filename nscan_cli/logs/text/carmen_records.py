@@ -6,7 +6,6 @@ logger_timestamp`; lines that begin with # are comments.
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import dataclass
 
@@ -24,6 +23,7 @@ from nscan_cli.logs.text.line_records import (
     beam_count,
     blocks,
     parsed_poses,
+    record_lines,
     rows_within_bounds,
 )
 from nscan_cli.poses import Array
@@ -68,10 +68,7 @@ def lines_by_tag(data: bytes, skips: Skips) -> TaggedLines:
     """The lines of a log by tag. A line with a tag that is not read is replaced by ONLY_COUNTED."""
     by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
     used: set[bytes] = set()
-    for number, line in enumerate(io.BytesIO(data), 1):
-        text = line.strip()
-        if not text or text.startswith(b"#"):
-            continue
+    for number, text in record_lines(data):
         tag, _, rest = text.partition(b" ")
         if b"\t" in tag:
             tag, rest = [*text.split(None, 1), b""][:2]

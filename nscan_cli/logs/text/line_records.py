@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import warnings
 from collections.abc import Iterator
@@ -59,6 +60,17 @@ class Block(NamedTuple):
     """Number of beams of each record."""
     values: Array
     """(R, V) values of each record."""
+
+
+def record_lines(data: bytes, comments: bytes = b"#") -> Iterator[tuple[int, bytes]]:
+    """The lines of a log and their numbers, from 1, but for blank lines and those that begin with `comments`.
+
+    Blanks at both ends are left out.
+    """
+    for number, line in enumerate(io.BytesIO(data), 1):
+        text = line.strip()
+        if text and text[0] not in comments:
+            yield number, text
 
 
 def parsed(records: list[tuple[LineRecord, int]], skips: Skips) -> Iterator[tuple[LineRecord, int, Array]]:

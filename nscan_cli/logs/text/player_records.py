@@ -8,7 +8,6 @@ Lines that begin with # are comments.
 
 from __future__ import annotations
 
-import io
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from nscan_cli.logs.text.line_records import (
     beam_count,
     parsed,
     parsed_poses,
+    record_lines,
     within_bounds,
 )
 from nscan_cli.poses import Array
@@ -63,10 +63,7 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> DeviceLines:
     """
     fields, at, time = FIELD_POSITIONS[version]
     found: dict[tuple[bytes, bytes, bytes, bytes, bytes], list[PayloadLine]] = {}
-    for number, line in enumerate(io.BytesIO(data), 1):
-        text = line.strip()
-        if not text or text.startswith(b"#"):
-            continue
+    for number, text in record_lines(data):
         parts = text.split(None, fields)
         if len(parts) < fields or not INTERFACE.match(parts[at]) or _number(parts[at + 1]) < 0:
             skips.add("not a Player record", number)

@@ -7,7 +7,6 @@ The beams go from −fov/2 to fov/2 in n − 1 steps.
 
 from __future__ import annotations
 
-import io
 import re
 
 import numpy as np
@@ -24,7 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, parsed_poses
+from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, parsed_poses, record_lines
 from nscan_cli.logs.text.odometry_records import odometry_of_records
 from nscan_cli.poses import Array, wrap
 
@@ -74,10 +73,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
 def _records_by_tag(data: bytes, skips: Skips) -> ScriptRecords:
     """The records of a log by tag; other lines are skipped."""
     records: ScriptRecords = {}
-    for number, line in enumerate(io.BytesIO(data), 1):
-        text = line.strip()
-        if not text or text[:1] in b"#*":
-            continue
+    for number, text in record_lines(data, comments=b"#*"):
         parts = RECORD.match(text)
         if parts is None:
             skips.add("not a .script record", number)
