@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from nscan_cli.calibration.robot_calibration import Calibration
     from nscan_cli.logs.laser_log import LaserLog
 
+DEGREES = math.degrees(1.0)
+"""In a radian."""
 ANGLE_VALUES = ("mount_angle", "veer")
 """Values in rad, or rad/m, that are printed in degrees."""
 VALUE_UNITS = {
@@ -125,45 +127,57 @@ class _Calibrated:
 
     def rows(self, with_name: bool) -> list[Row]:
         """The table for people."""
-        name: list[Row] = [("laser", [self.scans.laser])] if with_name else []
-        return name + _rows(self.calibration, self.reading, self.calibrated)
+        evidence, values = self.calibration.evidence, self.calibration.values
+        measured = (
+            f"{evidence.measured} of {counted(evidence.sampled, 'step')} measured, "
+            f"{evidence.turns} with a turn"
+        )
+        order = "in the wrong order: mirrored" if self.calibration.mirrored else "in the order of the file"
+        flags = changed_flags(self.reading, self.calibrated)
+        # The file says nothing of it but 0.
+        difference = dataclasses.replace(_times(values["wheel_difference"], 100.0), recorded=None)
+        return [
+            ("laser", [self.scans.laser] if with_name else []),
+            ("steps", [f"{measured}; {evidence.distance:.1f} m and {evidence.turned:.1f} rad"]),
+            ("readings", [order]),
+            ("sweep", _sweep_lines(self.calibration)),
+            ("mounting", [_line("x", values["mount_x"], "m"), _line("y", values["mount_y"], "m"),
+                          _line("turned by", _times(values["mount_angle"], DEGREES), "°")]),
+            ("odometry", [_line("scale", values["odometry_scale"]),
+                          _line("turns by odometry / turns by scans", values["turn_ratio"]),
+                          _line("heading drift", _times(values["veer"], DEGREES), "°/m")]),
+            ("wheels", [_line("right larger than left by", difference, "% per metre of track width"),
+                        _line("track width / that of odometry", values["track_width"])]),
+            ("noise", [_line("per metre driven", values["noise_distance"], "m/m"),
+                       _line("per radian turned", values["noise_turn"], "rad/rad")]),
+            ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
+            ("unknown", _unknown(self.calibration) or ["nothing"]),
+            ("options", [flags or "none: the file agrees with the scans"]),
+        ]  # fmt: skip
 
     def facts(self) -> dict[str, Any]:
-        """The object that `calibrate --json` prints of one laser."""
-        source = self.scans.source
-        return _facts(self.calibration, self.calibrated) | {
+        """The object that `calibrate --json` prints of one laser, in m, s and degrees.
+
+        Its keys are always the same.
+        """
+        evidence, found = self.calibration.evidence, self.calibration
+        return {
+            "steps": {
+                "sampled": evidence.sampled,
+                "measured": evidence.measured,
+                "with_turn": evidence.turns,
+                "distance": _rounded(evidence.distance),
+                "turned": _rounded(math.degrees(evidence.turned)),
+            },
+            "mirrored": found.mirrored,
+            "sweep": {"pairs": evidence.pairs, "used": _rounded(found.sweep), "stamp": found.stamp},
+            "values": {name: _value_facts(name, estimate) for name, estimate in found.values.items()},
+            "open": found.open,
+            "options": robot_table(self.calibrated),
             "laser": self.scans.laser,
-            "file": source.name,
-            "sha256": source.sha256,
+            "file": self.scans.source.name,
+            "sha256": self.scans.source.sha256,
         }
-
-
-def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: ReadingOptions) -> list[Row]:
-    evidence, values = calibration.evidence, calibration.values
-    noise, turn_noise = values["noise_distance"], values["noise_turn"]
-    measured = (
-        f"{evidence.measured} of {counted(evidence.sampled, 'step')} measured, {evidence.turns} with a turn"
-    )
-    order = "in the wrong order: mirrored" if calibration.mirrored else "in the order of the file"
-    flags = changed_flags(reading, calibrated)
-    return [
-        ("steps", [f"{measured}; {evidence.distance:.1f} m and {evidence.turned:.1f} rad"]),
-        ("readings", [order]),
-        ("sweep", _sweep_lines(calibration)),
-        ("mounting", [_line("x", values["mount_x"], "m"), _line("y", values["mount_y"], "m"),
-                      _line("turned by", _degrees(values["mount_angle"]), "°")]),
-        ("odometry", [_line("scale", values["odometry_scale"]),
-                      _line("turns by odometry / turns by scans", values["turn_ratio"]),
-                      _line("heading drift", _degrees(values["veer"]), "°/m")]),
-        ("wheels", [_line("right larger than left by", _percent(values["wheel_difference"]),
-                          "% per metre of track width"),
-                    _line("track width / that of odometry", values["track_width"])]),
-        ("noise", [_line("per metre driven", noise, "m/m"),
-                   _line("per radian turned", turn_noise, "rad/rad")]),
-        ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
-        ("unknown", _unknown(calibration) or ["nothing"]),
-        ("options", [flags or "none: the file agrees with the scans"]),
-    ]  # fmt: skip
 
 
 def _sweep_lines(calibration: Calibration) -> list[str]:
@@ -195,45 +209,21 @@ def _line(what: str, estimate: Estimate, unit: str = "") -> str:
     return f"{what} {shown}{'' if unit[:1] in ('°', '') else ' '}{unit}{recorded}"
 
 
-def _degrees(estimate: Estimate) -> Estimate:
-    """An angle in degrees."""
-    recorded = None if estimate.recorded is None else math.degrees(estimate.recorded)
-    value, sigma = math.degrees(estimate.value), math.degrees(estimate.sigma)
+def _times(estimate: Estimate, factor: float) -> Estimate:
+    """An estimate in another unit."""
+    recorded = None if estimate.recorded is None else estimate.recorded * factor
+    value, sigma = estimate.value * factor, estimate.sigma * factor
     return dataclasses.replace(estimate, value=value, sigma=sigma, recorded=recorded)
 
 
-def _percent(estimate: Estimate) -> Estimate:
-    """A share in percent; what the file says of it is nothing."""
-    return dataclasses.replace(
-        estimate, value=100.0 * estimate.value, sigma=100.0 * estimate.sigma, recorded=None
-    )
-
-
-def _facts(calibration: Calibration, calibrated: ReadingOptions) -> dict[str, Any]:
-    """What the scans say, in m, s and degrees. The keys are always the same."""
-    evidence, values = calibration.evidence, {}
-    for name, estimate in calibration.values.items():
-        shown = _degrees(estimate) if name in ANGLE_VALUES else estimate
-        values[name] = {
-            "value": _rounded(shown.value),
-            "sigma": _rounded(shown.sigma) if math.isfinite(shown.sigma) else None,
-            "recorded": None if shown.recorded is None else _rounded(shown.recorded),
-            "unit": VALUE_UNITS.get(name),
-            "why_open": estimate.why_open or None,
-        }
+def _value_facts(name: str, estimate: Estimate) -> dict[str, Any]:
+    shown = _times(estimate, DEGREES) if name in ANGLE_VALUES else estimate
     return {
-        "steps": {
-            "sampled": evidence.sampled,
-            "measured": evidence.measured,
-            "with_turn": evidence.turns,
-            "distance": _rounded(evidence.distance),
-            "turned": _rounded(math.degrees(evidence.turned)),
-        },
-        "mirrored": calibration.mirrored,
-        "sweep": {"pairs": evidence.pairs, "used": _rounded(calibration.sweep), "stamp": calibration.stamp},
-        "values": values,
-        "open": calibration.open,
-        "options": robot_table(calibrated),
+        "value": _rounded(shown.value),
+        "sigma": _rounded(shown.sigma) if math.isfinite(shown.sigma) else None,
+        "recorded": None if shown.recorded is None else _rounded(shown.recorded),
+        "unit": VALUE_UNITS.get(name),
+        "why_open": estimate.why_open or None,
     }
 
 
