@@ -7,10 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from nscan_cli.cli.shared_options import Command
-from nscan_cli.cli.subcommand import PATH, option
+from nscan_cli.cli.shared_options import Command, with_options
+from nscan_cli.cli.subcommand import PATH, Parsed, option
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.outputs import write_atomically
 
@@ -24,22 +22,21 @@ if TYPE_CHECKING:
 AUTO = "auto"
 
 
-class BoxType(click.ParamType[Any]):
-    """X0,Y0,X1,Y1 in m, the lower left and the upper right corner, or auto."""
+def _box_from(text: str) -> Box | str:
+    """X0,Y0,X1,Y1 in m, the lower left and the upper right corner, or AUTO."""
+    if text == AUTO:
+        return text
+    try:
+        x0, y0, x1, y1 = (float(part) for part in text.split(","))
+    except ValueError as error:
+        problem = f"{text!r} is not of the form X0,Y0,X1,Y1, as in -10,-5,30,25, nor {AUTO}"
+        raise ValueError(problem) from error
+    if not all(math.isfinite(part) for part in (x0, y0, x1, y1)) or x0 >= x1 or y0 >= y1:
+        raise ValueError(f"{text!r} is not a lower left corner before an upper right one")
+    return (x0, y0, x1, y1)
 
-    name = f"X0,Y0,X1,Y1|{AUTO}"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the four numbers; a wrong form is a usage error."""
-        if value == AUTO:
-            return value
-        try:
-            x0, y0, x1, y1 = (float(part) for part in value.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not of the form X0,Y0,X1,Y1, as in -10,-5,30,25, nor {AUTO}", param, ctx)
-        if not all(math.isfinite(part) for part in (x0, y0, x1, y1)) or x0 >= x1 or y0 >= y1:
-            self.fail(f"{value!r} is not a lower left corner before an upper right one", param, ctx)
-        return (x0, y0, x1, y1)
+BOX = Parsed(f"X0,Y0,X1,Y1|{AUTO}", _box_from)
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ def shape_options(command: Command) -> Command:
     """Add --align, --crop, --clean and --removed; the command gets them as `shape`, a MapShape."""
     options = [
         option("--align", is_flag=True, help="Turn the map so that most walls lie along its axes."),
-        option("--crop", type=BoxType(), metavar=BoxType.name,
+        option("--crop", type=BOX, metavar=BOX.name,
                help="Cut the map to a rectangle (m), or to what is mapped (auto)."),
         option("--clean", is_flag=True,
                help="Remove free space that the path does not reach, single specks, and people who passed."),
@@ -108,9 +105,7 @@ def shape_options(command: Command) -> Command:
             raise WrongUsageError("--removed draws what --clean removes; give --clean, too")
         return command(*args, shape=shape, **kwargs)
 
-    for decorator in reversed(options):
-        wrapped = decorator(wrapped)
-    return wrapped
+    return with_options(wrapped, options)
 
 
 def shaped_map(

@@ -14,8 +14,8 @@ from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.picture_names import check_document_name
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
-from nscan_cli.cli.shared_options import PoseType, common_options, reading_options
-from nscan_cli.cli.subcommand import log_argument, option, result_option, subcommand
+from nscan_cli.cli.shared_options import common_options, pose_from, reading_options
+from nscan_cli.cli.subcommand import Parsed, log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.outputs import check_writable, write_atomically
@@ -31,19 +31,14 @@ if TYPE_CHECKING:
 MATCH_FORMAT = "nscan-match"
 
 
-class StartType(click.ParamType[Any]):
-    """odometry, identity or X,Y,DEG; kept as typed."""
-
-    name = "start"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Check the form; another form is a usage error."""
-        if value not in ("odometry", "identity"):
-            try:
-                PoseType().convert(value, param, ctx)
-            except click.BadParameter as error:
-                self.fail(f"{error.message}, nor odometry or identity", param, ctx)
-        return value
+def _start_from(text: str) -> str:
+    """odometry, identity or X,Y,DEG, as typed."""
+    if text not in ("odometry", "identity"):
+        try:
+            pose_from(text)
+        except ValueError as error:
+            raise ValueError(f"{error}, nor odometry or identity") from error
+    return text
 
 
 @subcommand(
@@ -59,7 +54,7 @@ class StartType(click.ParamType[Any]):
         help="Number of the reference scan, which stays fixed.")  # fmt: skip
 @option("--scan", type=click.IntRange(0), required=True, metavar="J",
         help="Number of the scan that is moved.")  # fmt: skip
-@option("--initial", type=StartType(), metavar="odometry|identity|X,Y,DEG",
+@option("--initial", type=Parsed("start", _start_from), metavar="odometry|identity|X,Y,DEG",
         help="Initial pose of J in the frame of I (m, degrees). Default: odometry, or identity if there is "
         "none.")  # fmt: skip
 @option("--prior", type=click.Choice(["odometry", "none"]),
@@ -151,7 +146,7 @@ def _initial_pose(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
         return relative(log.odometry[rows[1]], log.odometry[rows[0]])
     if initial == "identity":
         return np.zeros(3)
-    return np.array(PoseType().convert(initial, None, None))
+    return np.array(pose_from(initial))
 
 
 def match_document(name: str, provenance: dict[str, Any], fields: dict[str, Any]) -> bytes:

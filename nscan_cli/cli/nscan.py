@@ -15,7 +15,7 @@ from nscan_cli.cli.picture_names import check_document_name
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.subcommand import PATH, log_argument, option, result_option, subcommand
+from nscan_cli.cli.subcommand import PATH, Parsed, log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.outputs import check_writable, write_atomically
@@ -39,33 +39,31 @@ MOST_SCANS = 500
 """The Hessian grows with the square of the number of scans; a longer list is taken for a typing error."""
 
 
-class ScanSpecType(click.ParamType[Any]):
-    """Converts scan numbers and ranges, such as `10,12,14-20` or `100-190:10`, to a tuple of scan numbers."""
+def scans_from(text: str) -> tuple[int, ...]:
+    """The scan numbers of a text such as `10,12,14-20` or `100-190:10`.
 
-    name = "SPEC"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the scan numbers; another form, a single scan and a repeated scan are usage errors."""
-        scans: list[int] = []
-        for part in value.split(","):
-            match = SPEC_PART.fullmatch(part.strip())
-            if match is None:
-                self.fail(f"{part!r} is not of the form 10, 14-20 or 100-190:10", param, ctx)
-            first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
-            if last < first:
-                self.fail(f"{part!r} runs backwards", param, ctx)
-            if step == 0:
-                self.fail(f"{part!r} has a step of 0", param, ctx)
-            chosen = range(first, last + 1, step)
-            if len(chosen) > MOST_SCANS - len(scans):
-                self.fail(f"{value!r} has more than {MOST_SCANS} scans", param, ctx)
-            scans += chosen
-        if len(scans) < 2:
-            self.fail(f"{value!r} has only one scan; give two or more", param, ctx)
-        if len(set(scans)) < len(scans):
-            twice = next(scan for at, scan in enumerate(scans) if scan in scans[:at])
-            self.fail(f"{value!r} has scan {twice} twice", param, ctx)
-        return tuple(scans)
+    Raises ValueError for another form, a single scan and a repeated scan.
+    """
+    scans: list[int] = []
+    for part in text.split(","):
+        match = SPEC_PART.fullmatch(part.strip())
+        if match is None:
+            raise ValueError(f"{part!r} is not of the form 10, 14-20 or 100-190:10")
+        first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+        if last < first:
+            raise ValueError(f"{part!r} runs backwards")
+        if step == 0:
+            raise ValueError(f"{part!r} has a step of 0")
+        chosen = range(first, last + 1, step)
+        if len(chosen) > MOST_SCANS - len(scans):
+            raise ValueError(f"{text!r} has more than {MOST_SCANS} scans")
+        scans += chosen
+    if len(scans) < 2:
+        raise ValueError(f"{text!r} has only one scan; give two or more")
+    if len(set(scans)) < len(scans):
+        twice = next(scan for at, scan in enumerate(scans) if scan in scans[:at])
+        raise ValueError(f"{text!r} has scan {twice} twice")
+    return tuple(scans)
 
 
 @subcommand(
@@ -77,7 +75,7 @@ class ScanSpecType(click.ParamType[Any]):
     ),
 )
 @log_argument()
-@option("--scans", "numbers", type=ScanSpecType(), required=True,
+@option("--scans", "numbers", type=Parsed("SPEC", scans_from), required=True,
         help="Numbers of the scans to match, such as 10,12,14-20 or 100-190:10.")  # fmt: skip
 @option("--pairs", type=click.Choice(["all", "visible", "overlap"]), default="overlap", show_default=True,
         help="Pairs of scans to match: all, those of which one saw the other's position (visible), or those "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import json
@@ -12,7 +13,7 @@ from typing import Any
 
 import click
 
-from nscan_cli.cli.subcommand import ADVANCED, COMMAND_SPECIFIC, COMMON, READING, Option, option
+from nscan_cli.cli.subcommand import ADVANCED, COMMAND_SPECIFIC, COMMON, READING, Option, Parsed, option
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.outputs import write_atomically
@@ -23,51 +24,36 @@ Command = Callable[..., Any]
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
 
 
-class PoseType(click.ParamType[Any]):
-    """X,Y,DEG on the command line, (x, y, θ) in m and rad inside."""
-
-    name = "X,Y,DEG"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the three numbers; a wrong form is a usage error."""
-        try:
-            x, y, degrees = (float(part) for part in value.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not of the form X,Y,DEG, as in 0.1,0,90", param, ctx)
-        if not all(math.isfinite(part) for part in (x, y, degrees)):
-            self.fail(f"{value!r} has a part that is not finite", param, ctx)
-        return (x, y, math.radians(degrees))
+def pose_from(text: str) -> tuple[float, float, float]:
+    """The pose (x, y, θ), in m and rad, of a text X,Y,DEG. Raises ValueError if it is none."""
+    try:
+        x, y, degrees = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ValueError(f"{text!r} is not of the form X,Y,DEG, as in 0.1,0,90") from error
+    if not all(math.isfinite(part) for part in (x, y, degrees)):
+        raise ValueError(f"{text!r} has a part that is not finite")
+    return x, y, math.radians(degrees)
 
 
-class MaskType(click.ParamType[Any]):
-    """FROM:TO,… in degrees on the command line, pairs of bearings in rad inside."""
-
-    name = "FROM:TO,..."
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the sectors; a wrong form is a usage error."""
-        try:
-            return sectors_from(value)
-        except ValueError:
-            self.fail(f"{value!r} is not of the form FROM:TO,..., as in 130:150,-150:-130", param, ctx)
+def _mask_from(text: str) -> tuple[tuple[float, float], ...]:
+    try:
+        return sectors_from(text)
+    except ValueError as error:
+        raise ValueError(f"{text!r} is not of the form FROM:TO,..., as in 130:150,-150:-130") from error
 
 
-class SweepType(click.ParamType[Any]):
-    """SECONDS, auto or off on the command line; inside a number, None for auto, 0 for off."""
+def _sweep_from(text: str) -> float | None:
+    if text in SWEEP_WORDS:
+        return SWEEP_WORDS[text]
+    with contextlib.suppress(ValueError):
+        if math.isfinite(seconds := float(text)):
+            return seconds
+    raise ValueError(f"{text!r} is neither a time in seconds nor auto or off")
 
-    name = "SECONDS|auto|off"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the time; a wrong form is a usage error."""
-        if value in ("auto", "off"):
-            return None if value == "auto" else 0.0
-        try:
-            seconds = float(value)
-        except ValueError:
-            seconds = math.nan
-        if not math.isfinite(seconds):
-            self.fail(f"{value!r} is neither a time in seconds nor auto or off", param, ctx)
-        return seconds
+SWEEP_WORDS = {"auto": None, "off": 0.0}
+POSE, MASK = Parsed("X,Y,DEG", pose_from), Parsed("FROM:TO,...", _mask_from)
+SWEEP = Parsed("SECONDS|auto|off", _sweep_from)
 
 
 def common_options(command: Command) -> Command:
@@ -89,10 +75,10 @@ def common_options(command: Command) -> Command:
             help="Read option values from a TOML file."),
         say("--dump-config", is_flag=True, help="Print the options in force as TOML, then exit."),
     ]  # fmt: skip
-    return _with_options(wrapped, options)
+    return with_options(wrapped, options)
 
 
-def _with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
+def with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
     """The command with the options, in this order in its help."""
     for decorator in reversed(options):
         command = decorator(command)
@@ -109,7 +95,7 @@ def reading_options(command: Command) -> Command:
              help="Laser topic to use of an MCAP or bag, such as /scan. Default: the only one."),
         read("--odom-topic", metavar="TOPIC",
              help="Odometry topic to use, such as /odom or /tf. Default: the only one, or tf."),
-        read("--mount", type=PoseType(),
+        read("--mount", type=POSE,
              help="Pose of the laser on the robot (m, degrees). Default: that in the log."),
         read("--flip", is_flag=True, help="The laser is mounted upside down."),
         read("--min-range", type=click.FloatRange(0), metavar="M",
@@ -128,10 +114,10 @@ def reading_options(command: Command) -> Command:
              help="Direction of the first beam. Default: that in the log."),
         rare("--angle-increment", type=float, metavar="DEG",
              help="Angle from beam to beam. Default: that in the log."),
-        rare("--mask", type=MaskType(),
+        rare("--mask", type=MASK,
              help="Drop beams between bearings (degrees, counter-clockwise). Default: those that see "
              "the robot."),
-        rare("--sweep", type=SweepType(), metavar=SweepType.name, default="auto", show_default=True,
+        rare("--sweep", type=SWEEP, metavar=SWEEP.name, default="auto", show_default=True,
              help="Seconds of a full turn of the laser, so that each beam has its own time; negative if the "
              "readings are in the reverse order of time. off: all at once. auto: as the log says."),
         rare("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,
@@ -157,7 +143,7 @@ def reading_options(command: Command) -> Command:
                 values[angle] = math.radians(values[angle])
         return command(*args, reading=ReadingOptions(**values), **kwargs)
 
-    return _with_options(wrapped, options)
+    return with_options(wrapped, options)
 
 
 def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
@@ -238,9 +224,9 @@ def _as_toml(ctx: click.Context) -> str:
         value = ctx.params.get(param.name or "")
         if value is None or value == ():
             continue
-        if isinstance(param.type, PoseType):
+        if param.type is POSE:
             value = [value[0], value[1], math.degrees(value[2])]
-        elif isinstance(param.type, MaskType):
+        elif param.type is MASK:
             value = [f"{math.degrees(first):.12g}:{math.degrees(last):.12g}" for first, last in value]
         elif isinstance(value, str):
             try:

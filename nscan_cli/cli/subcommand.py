@@ -92,8 +92,21 @@ class Option(click.Option):
 
 
 def _upper_case(name: str) -> str:
-    """The name of a command or an option as part of a variable's name."""
     return name.upper().replace("-", "_")
+
+
+class Parsed(click.ParamType[Any]):
+    """The type of values in a form of their own, which a function reads. Its ValueError is a usage error."""
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name, self.parse = name, parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """What the function makes of the value."""
+        try:
+            return self.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
 class Argument(click.Argument):

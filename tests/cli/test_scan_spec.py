@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import click
 import pytest
 
-from nscan_cli.cli.nscan import ScanSpecType
+from nscan_cli.cli.nscan import scans_from
 
 
 @pytest.mark.parametrize(
@@ -18,7 +17,7 @@ from nscan_cli.cli.nscan import ScanSpecType
     ],
 )
 def test_spec(spec, scans):
-    assert ScanSpecType().convert(spec, None, None) == tuple(scans)
+    assert scans_from(spec) == tuple(scans)
 
 
 @pytest.mark.parametrize(
@@ -32,5 +31,5 @@ def test_spec(spec, scans):
     ],
 )  # fmt: skip
 def test_spec_that_is_none(spec, said):
-    with pytest.raises(click.BadParameter, match=said):
-        ScanSpecType().convert(spec, None, None)
+    with pytest.raises(ValueError, match=said):
+        scans_from(spec)
