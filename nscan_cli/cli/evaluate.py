@@ -86,9 +86,8 @@ def command(
     from nscan_cli.evaluation.evaluate_result import evaluate_result
     from nscan_cli.evaluation.evaluation_report import as_document, evaluation_text
 
-    evaluated = evaluate_result(result, relations, reference, worst or 0, reading, reference_topic)
-    evaluation = evaluated.evaluation
-    for notice in evaluated.notices:
+    evaluation = evaluate_result(result, relations, reference, worst or 0, reading, reference_topic)
+    for notice in evaluation.notices:
         say(f"warning: {notice}", quiet)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
@@ -102,8 +101,7 @@ def command(
     if plot is not None:
         from nscan_cli.evaluation.error_picture import picture
 
-        drawn = DEFAULT_DRAWN if worst is None else worst
-        write_plot(plot, picture(evaluation, evaluated.trajectory, evaluated.reference, drawn))
+        write_plot(plot, picture(evaluation, DEFAULT_DRAWN if worst is None else worst))
     _check_bounds(evaluation, max_translation, max_rotation)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 from nscan_cli.evaluation.evaluation_report import Evaluation
 from nscan_cli.evaluation.load_trajectory import load_reference, load_trajectory
@@ -10,19 +10,7 @@ from nscan_cli.evaluation.reference_relations import read_relations, relation_er
 from nscan_cli.evaluation.remarks import remarks
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.files.inputs import base_name, label
-from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.logs.reading_options import ReadingOptions
-
-
-@dataclass(frozen=True)
-class EvaluatedResult:
-    """An evaluation, and the trajectories that it was made from."""
-
-    evaluation: Evaluation
-    trajectory: Trajectory
-    reference: Trajectory | None
-    notices: tuple[str, ...] = ()
-    """Warnings from reading the files."""
 
 
 def evaluate_result(
@@ -32,7 +20,7 @@ def evaluate_result(
     worst: int = 0,
     reading: ReadingOptions = ReadingOptions(),
     reference_topic: str | None = None,
-) -> EvaluatedResult:
+) -> Evaluation:
     """The errors of the file `result`, and its `worst` relations.
 
     `reference_topic` is the topic of the poses when the reference is a recording.
@@ -41,15 +29,13 @@ def evaluate_result(
     """
     notices: list[str] = []
     trajectory = load_trajectory(result, reading, notices)
-    on_relations, on_reference, truth = None, None, None
-    found: tuple[str, ...] = ()
+    found = Evaluation(base_name(result), trajectory, worst=worst)
     if relations is not None:
         table = read_relations(relations)
-        on_relations = (table, relation_errors(trajectory, table, label(result)))
+        found = replace(found, relations=(table, relation_errors(trajectory, table, label(result))))
     if reference is not None:
         truth = load_reference(reference, reading, notices, reference_topic)
         errors = trajectory_errors(trajectory, truth, label(result), label(reference))
-        on_reference = (base_name(reference), errors)
-        found = tuple(remarks(trajectory, truth, errors))
-    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst, found)
-    return EvaluatedResult(evaluation, trajectory, truth, tuple(notices))
+        said = tuple(remarks(trajectory, truth, errors))
+        found = replace(found, reference=(base_name(reference), truth, errors), remarks=said)
+    return replace(found, notices=tuple(notices))

@@ -14,6 +14,7 @@ from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
 from nscan_cli.files.provenance import as_parameters
 from nscan_cli.files.text import counted
+from nscan_cli.graph.io.tum import Trajectory
 
 ERROR_UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
 
@@ -24,13 +25,15 @@ class Evaluation:
 
     result: str
     """Base name, as are the names below."""
-    poses: int
+    trajectory: Trajectory
     relations: tuple[ReferenceRelations, RelationErrors] | None = None
-    reference: tuple[str, TrajectoryErrors] | None = None
+    reference: tuple[str, Trajectory, TrajectoryErrors] | None = None
     worst: int = 0
     """How many of the worst relations are listed."""
     remarks: tuple[str, ...] = ()
     """Sentences on other differences of result and reference (remarks.py)."""
+    notices: tuple[str, ...] = ()
+    """Warnings from reading the files."""
     options: EvaluationOptions = field(default_factory=EvaluationOptions)
 
     def bounded(self) -> list[tuple[str, float, float]]:
@@ -40,14 +43,14 @@ class Evaluation:
             errors = self.relations[1]
             figures.append(("mean on relations", errors.translation_spread.mean, errors.rotation_spread.mean))
         if self.reference:
-            ate = self.reference[1]
+            ate = self.reference[2]
             figures.append(("RMSE of the ATE", ate.absolute_translation.rmse, ate.absolute_rotation.rmse))
         return figures
 
 
 def evaluation_text(evaluation: Evaluation) -> str:
     """The tables, with a final line feed."""
-    blocks = [f"result     {evaluation.result}: {counted(evaluation.poses, 'pose')}"]
+    blocks = [f"result     {evaluation.result}: {counted(len(evaluation.trajectory), 'pose')}"]
     if evaluation.relations:
         relations, errors = evaluation.relations
         near, tolerance = len(errors.used) - errors.exact, evaluation.options.tolerance
@@ -62,7 +65,7 @@ def evaluation_text(evaluation: Evaluation) -> str:
         if evaluation.worst:
             blocks.append(_worst_table(evaluation))
     if evaluation.reference:
-        name, errors_ = evaluation.reference
+        name, _truth, errors_ = evaluation.reference
         distance = evaluation.options.relative_distance
         rows = {
             "ATE, m": errors_.absolute_translation,
@@ -90,7 +93,8 @@ def _alignment_note(alignment: Alignment) -> str:
 def as_document(evaluation: Evaluation) -> dict[str, Any]:
     """The evaluation as an object for JSON; lengths in m, angles in degrees, those in its parameters in
     rad."""
-    document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": ERROR_UNITS}
+    poses = len(evaluation.trajectory)
+    document: dict[str, Any] = {"result": evaluation.result, "poses": poses, "units": ERROR_UNITS}
     if evaluation.relations:
         relations, errors = evaluation.relations
         document["relations"] = {
@@ -105,7 +109,7 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
             "worst": _worst_rows(evaluation),
         }
     if evaluation.reference:
-        name, against = evaluation.reference
+        name, _truth, against = evaluation.reference
         document["reference"] = {
             "name": name,
             "matched": against.matched,

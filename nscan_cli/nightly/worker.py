@@ -122,7 +122,7 @@ def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | Non
     relations, reference = inputs.get("relations"), inputs.get("reference")
     if relations is None and reference is None:
         return None
-    return as_document(evaluate_result(graph_file, relations, reference).evaluation)
+    return as_document(evaluate_result(graph_file, relations, reference))
 
 
 def _progress_printer() -> Callable[[int, int, int], None]:
