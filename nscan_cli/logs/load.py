@@ -22,8 +22,8 @@ from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_files import Parts, first_bytes, journals_of, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings import split_recordings
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Recording
+from nscan_cli.logs.recordings.split_recordings import merge_recordings, start_of
 
 
 class Reader(Protocol):
@@ -169,9 +169,8 @@ def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, li
 
 def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
     """The messages in several files of one recording, and the files. One file at a time is in memory."""
-    found: list[tuple[str, Recording]] = []
-    sources: list[tuple[Source, ...]] = []
-    first: tuple[str, str] | None = None
+    found: list[tuple[str, Recording, Source]] = []
+    first = ""
     with _limits_as_input_errors(parts.title):
         for path in parts.files:
             stored = stored_bytes(path)
@@ -180,16 +179,19 @@ def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
             if not form.container:
                 problem = f"{path}: is {form.name}, not a recording"
                 raise WrongUsageError(f"{problem}; several LOGs must be the files of one recording")
-            first = first or (path, form.name)
-            if form.name != first[1]:
-                raise split_recordings.different_forms(first, (path, form.name))
-            sources.append(_source(stored, path).files)
+            first = first or form.name
+            if form.name != first:
+                raise WrongUsageError(
+                    f"{parts.files[0]} is {first}, {path} {form.name}: they are not files of one recording; "
+                    "give one of them alone"
+                )
+            source = _source(stored, path)
             del stored
-            found.append((base_name(path), _messages(form, data, path, salvage, lost)))
+            found.append((base_name(path), _messages(form, data, path, salvage, lost), source))
             del data
-        order = split_recordings.order_by_start(found)
-        whole = split_recordings.merge_recordings([found[place] for place in order], parts.are_parts)
-    return whole, _joint_source(parts.name, [file for place in order for file in sources[place]])
+        found.sort(key=lambda each: start_of(each[1]))
+        whole = merge_recordings([each[:2] for each in found], parts.are_parts)
+    return whole, _joint_source(parts.name, [file for each in found for file in each[2].files])
 
 
 def _form(data: FileBytes, name: str) -> Form:

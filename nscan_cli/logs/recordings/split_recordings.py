@@ -10,18 +10,13 @@ from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.scan_order import ScanOrderOptions
 
 
-def order_by_start(recordings: Sequence[tuple[str, Recording]]) -> list[int]:
-    """The indices of named recordings by the time of their first message; those without any come first."""
-
-    def start(index: int) -> int:
-        span = _time_span(recordings[index][1])
-        return span[0] if span else 0
-
-    return sorted(range(len(recordings)), key=start)
+def start_of(recording: Recording) -> int:
+    """When the first message was recorded, ns; 0 without messages."""
+    return (_time_span(recording) or (0, 0))[0]
 
 
 def merge_recordings(recordings: Sequence[tuple[str, Recording]], are_parts: bool) -> Recording:
-    """One recording of several named ones, which are in the order of order_by_start.
+    """One recording of several named ones, which are in the order of their starts.
 
     `are_parts` says that metadata or names show that they belong together; otherwise a long pause is an
     error. Raises WrongUsageError for it, and LimitExceededError when they are too large together.
@@ -52,15 +47,6 @@ def merge_recordings(recordings: Sequence[tuple[str, Recording]], are_parts: boo
     for messages in whole.messages.values():
         messages.sort(key=lambda message: message.log_time)
     return whole
-
-
-def different_forms(first: tuple[str, str], other: tuple[str, str]) -> WrongUsageError:
-    """The error that two files, each with its name and form, cannot be of one recording."""
-    (name, form), (other_name, other_form) = first, other
-    return WrongUsageError(
-        f"{name} is {form}, {other_name} {other_form}: they are not files of one recording; "
-        "give one of them alone"
-    )
 
 
 def _time_span(recording: Recording) -> tuple[int, int] | None:
