@@ -86,29 +86,25 @@ def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -
         )
         texts = [f"{time:.6f}" for time in times]
         return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
-    texts = list(stamps)
+    is_new = np.full(size, unit is not None)
     if unit is not None:
-        texts = [f"{time:.6f}" for time in written]
         warnings.append(f"the time stamps are in {unit.name}: they are multiplied by {unit.seconds:g}")
-    moved = np.flatnonzero(good & (times != written))
-    if len(moved):
-        for row in moved.tolist():
-            texts[row] = f"{times[row]:.6f}"
+    is_moved = good & (times != written)
+    if is_moved.any():
         warnings.append(
-            f"{counted(len(moved), 'scan')} with the time stamp of the scan before: they are spread evenly "
-            "up to the next stamp"
+            f"{counted(int(is_moved.sum()), 'scan')} with the time stamp of the scan before: they are spread "
+            "evenly up to the next stamp"
         )
     if not good.all():
         places = np.arange(size)
         times[~good] = np.interp(places[~good], places[good], times[good])
-        for row in np.flatnonzero(~good).tolist():
-            texts[row] = f"{times[row]:.6f}"
         warnings.append(
             f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: interpolated between others"
         )
+    is_new |= is_moved | ~good
     for since, by in _set_back(times, options):
         times[since:] += by
-        texts[since:] = [f"{time:.6f}" for time in times[since:]]
+        is_new[since:] = True
         warnings.append(
             f"the clock was set back by {by:.1f} s at scan {since}; later times are shifted to continue"
         )
@@ -116,7 +112,8 @@ def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -
     if backward:
         warnings.append(f"{counted(backward, 'step')} back in time; the scans are sorted by time")
     rows = np.argsort(times, kind="stable")
-    return ScanOrder(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
+    texts = [f"{times[row]:.6f}" if is_new[row] else stamps[row] for row in rows]
+    return ScanOrder(rows, times[rows], texts, backward, False, warnings)
 
 
 def _set_back(times: Array, options: ScanOrderOptions) -> list[tuple[int, float]]:
