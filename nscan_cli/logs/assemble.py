@@ -29,7 +29,6 @@ from nscan_cli.logs.repeated_reading import without_repeated_readings
 from nscan_cli.logs.robot_parts import ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.rounded_ranges import rounding_of_ranges
-from nscan_cli.logs.scan_checks import SCAN_CHECKS, ScanCheckOptions
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
@@ -85,7 +84,6 @@ def laser_log(
     motion: RecordedMotion,
     findings: ReaderFindings,
     options: ReadingOptions,
-    checks: ScanCheckOptions = SCAN_CHECKS,
 ) -> LaserLog:
     """The selected scans in order of time, with no-returns marked. `raw.ranges` may be overwritten.
 
@@ -95,37 +93,32 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings, of_file = findings.warnings, len(findings.warnings)
-    raw, limits, contradictions = _in_metres(raw, times, options, findings, checks)
+    raw, limits, contradictions = _in_metres(raw, times, options, findings)
     repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
-        raw, converted = with_radians(raw, checks.angle_unit)
+        raw, converted = with_radians(raw)
         contradictions += converted
     # With --max-range the user asks for all readings up to it.
     if not options.as_recorded and options.max_range is None:
-        repeated, no_distances = without_repeated_readings(raw.ranges, limits, checks.repeated_reading)
+        repeated, no_distances = without_repeated_readings(raw.ranges, limits)
         contradictions += no_distances
-    written = beam_directions(raw, options, warnings, checks.beam_angles)
+    written = beam_directions(raw, options, warnings)
     beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()
     if not options.as_recorded:
         seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
-        written, changed = corrected_directions(
-            seen, beams, -1 if options.flip else 1, checks.direction_changes
-        )
-    directions, told = in_whole_revolutions(
-        raw, written, limits, options, checks.whole_turn, checks.beam_spacing
-    )
+        written, changed = corrected_directions(seen, beams, -1 if options.flip else 1)
+    directions, told = in_whole_revolutions(raw, written, limits, options)
     if not told:
-        directions, told = checked_by_walls(raw, written, limits, options, checks.beam_spacing)
+        directions, told = checked_by_walls(raw, written, limits, options)
     angle_min, angle_increment = directions
     contradictions += [*changed, *told]
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
-    parts = checks.robot_parts
-    sectors, masked = masked_sectors(table, options, parts, checks.dead_beams)
-    floor = None if options.as_recorded else floor_line(table, sectors, checks.floor_line, parts)
+    sectors, masked = masked_sectors(table, options)
+    floor = None if options.as_recorded else floor_line(table, sectors)
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beams[rows], limits.of(rows)
-    lost = unusable_readings(ranges, beams, limits, file, checks.range_limits)
+    lost = unusable_readings(ranges, beams, limits, file)
     of_one_value = int(repeated[rows].sum())
     if of_one_value:
         # They were usable, and are counted as no number now.
@@ -134,22 +127,21 @@ def laser_log(
             lost.counts["not a number"] = others
         lost.counts["of one value"] = of_one_value
     mark_no_returns(ranges, limits.low, limits.high)
-    rounded = rounding_of_ranges(ranges, checks.rounded_ranges)
+    rounded = rounding_of_ranges(ranges)
     if rounded:
         warnings.append(rounded)
-    warnings += blind_scans(ranges, numbers, checks.blind_scans)
+    warnings += blind_scans(ranges, numbers)
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden
     if floor is not None:
-        bearings = angle_min[rows], angle_increment[rows]
-        lost.counts["of the floor"] = without_floor(ranges, *bearings, floor, checks.floor_line)
+        lost.counts["of the floor"] = without_floor(ranges, angle_min[rows], angle_increment[rows], floor)
         masked.append(floor.said)
-    sweep = _sweep(raw, angle_increment, times, options, checks)
+    sweep = _sweep(raw, angle_increment, times, options)
     if sweep.origin:
         findings.used["turn"] = sweep.origin
     swept = beam_times(sweep.seconds[numbers], angle_increment[rows], beams, options.stamp)
-    odometry, path, slow = _odometry(motion, times, raw.ranges, options, checks)
+    odometry, path, slow = _odometry(motion, times, raw.ranges, options)
     # Of several lasers, each says its own.
     of = f"{laser}: " if len(findings.lasers) > 1 else ""
     of_laser = [f"{of}{said}" for said in (*warnings[of_file:], *lost.warnings)]
@@ -201,11 +193,7 @@ def laser_log(
 
 
 def _odometry(
-    motion: RecordedMotion,
-    times: ScanOrder,
-    ranges: NDArray[np.float32],
-    options: ReadingOptions,
-    checks: ScanCheckOptions,
+    motion: RecordedMotion, times: ScanOrder, ranges: NDArray[np.float32], options: ReadingOptions
 ) -> tuple[Array | None, RobotPath | None, list[str]]:
     """The odometry (S, 3) of all scans in order of time, its path, and what was put right.
 
@@ -216,10 +204,10 @@ def _odometry(
         return None, recorded, []
     scale = options.odometry_scale
     if recorded is None:
-        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options, checks)
+        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options)
         return scaled_odometry(odometry, scale), None, said
-    poses, said = _credible(recorded.poses, recorded.times, None, options, checks)
-    path = robot_path(recorded.times, scaled_odometry(poses, scale), checks.robot_path)
+    poses, said = _credible(recorded.poses, recorded.times, None, options)
+    path = robot_path(recorded.times, scaled_odometry(poses, scale))
     odometry = scaled_odometry(odometry, scale)
     if said and path is not None:
         # Nothing is interpolated where poses are not used.
@@ -233,7 +221,6 @@ def _credible(
     times: Array,
     scans: tuple[NDArray[np.float32], Indices] | None,
     options: ReadingOptions,
-    checks: ScanCheckOptions,
 ) -> tuple[Array, list[str]]:
     """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and messages.
 
@@ -241,42 +228,36 @@ def _credible(
     """
     if options.as_recorded:
         return odometry, []
-    odometry, both = of_one_source(odometry, times, checks.two_odometries)
-    odometry, noise = without_noise(odometry, times, checks.noisy_odometry)
-    odometry, wrong = without_outliers(odometry, times, checks.odometry_outliers)
-    odometry, slow = without_repeats(odometry, times, scans, checks.slow_odometry)
+    odometry, both = of_one_source(odometry, times)
+    odometry, noise = without_noise(odometry, times)
+    odometry, wrong = without_outliers(odometry, times)
+    odometry, slow = without_repeats(odometry, times, scans)
     return odometry, [text for text in (both, noise, wrong, slow) if text]
 
 
-def _sweep(
-    raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions, checks: ScanCheckOptions
-) -> Sweep:
+def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:
     """The times of the laser's sweeps (S,), in order of time; `increments` (S,) are in file order, rad."""
     if options.sweep is not None:
         return Sweep(np.full(len(times.times), options.sweep), "--sweep")
     rows, beams = times.rows, beam_counts(raw.ranges, raw.beams)
     told = None if raw.recorded_sweep is None else raw.recorded_sweep.of(rows)
-    return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded, checks.sweep)
+    return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded)
 
 
 def _in_metres(
-    raw: RawScans,
-    times: ScanOrder,
-    options: ReadingOptions,
-    findings: ReaderFindings,
-    checks: ScanCheckOptions,
+    raw: RawScans, times: ScanOrder, options: ReadingOptions, findings: ReaderFindings
 ) -> tuple[RawScans, RangeLimits, list[str]]:
     """The scans in metres, their limits, and messages if the scans contradict the unit of the log."""
     if options.range_scale is not None:
-        raw = scaled(raw, options.range_scale, checks.range_unit)
-        return raw, limits_in_force(raw, options, findings.warnings, checks.range_limits), []
-    raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times, checks.unit_stretches)
+        raw = scaled(raw, options.range_scale)
+        return raw, limits_in_force(raw, options, findings.warnings), []
+    raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times)
     said: list[str] = []
-    limits = limits_in_force(raw, options, said, checks.range_limits)
-    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits, checks.range_unit)
+    limits = limits_in_force(raw, options, said)
+    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
     if unit is None or not unit.is_certain:
         findings.warnings += said
         return raw, limits, mixed
-    raw, findings.used["range_scale"] = scaled(raw, unit.scale, checks.range_unit), f"{unit.scale:g}"
-    limits = limits_in_force(raw, options, findings.warnings, checks.range_limits)
+    raw, findings.used["range_scale"] = scaled(raw, unit.scale), f"{unit.scale:g}"
+    limits = limits_in_force(raw, options, findings.warnings)
     return raw, limits, [*mixed, unit.correction]

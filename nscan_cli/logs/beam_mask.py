@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.dead_beams import DeadBeamOptions, dead_beams
+from nscan_cli.logs.dead_beams import dead_beams
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, Sector, robot_parts
+from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import Array, Mask
 
 Bearings = tuple[float, float]
@@ -19,15 +19,13 @@ BEARING_ROUNDING = 1e-5
 """rad; messages have 32 bits, logs and --mask have decimals of degrees."""
 
 
-def masked_sectors(
-    table: ScanTable, options: ReadingOptions, parts: RobotPartsOptions, dead: DeadBeamOptions
-) -> tuple[list[Bearings], list[str]]:
+def masked_sectors(table: ScanTable, options: ReadingOptions) -> tuple[list[Bearings], list[str]]:
     """The sectors that are not read, and the messages for the user."""
     if options.mask is not None:
         return list(options.mask), []
     if options.as_recorded:
         return [], []
-    found, constant = robot_parts(table, parts), dead_beams(table, dead)
+    found, constant = robot_parts(table), dead_beams(table)
     constant = [one for one in constant if not any(_is_within(one, part) for part in found)]
     sectors = [(sector.first, sector.last) for sector in (*found, *constant)]
     left_out = f"are left out, as by --mask {mask_text(sectors)}; --as-recorded uses them"

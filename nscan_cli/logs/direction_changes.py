@@ -50,7 +50,10 @@ class DirectionChangeOptions:
 
 
 def corrected_directions(
-    table: ScanTable, counts: Indices, sign: int, options: DirectionChangeOptions
+    table: ScanTable,
+    counts: Indices,
+    sign: int,
+    options: DirectionChangeOptions = DirectionChangeOptions(),
 ) -> tuple[BeamDirections, list[str]]:
     """The directions of the scans of a log, in file order, put right where scans show no change.
 

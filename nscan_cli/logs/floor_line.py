@@ -88,7 +88,10 @@ class FloorLine(NamedTuple):
 
 
 def floor_line(
-    table: ScanTable, sectors: Sequence[Bearings], options: FloorLineOptions, parts: RobotPartsOptions
+    table: ScanTable,
+    sectors: Sequence[Bearings],
+    options: FloorLineOptions = FloorLineOptions(),
+    parts: RobotPartsOptions = RobotPartsOptions(),
 ) -> FloorLine | None:
     """The line of the floor in the scans of a log, outside some sectors; None if they show none, or the robot
     never turns."""
@@ -163,7 +166,7 @@ def without_floor(
     angle_min: Array,
     angle_increment: Array,
     line: FloorLine,
-    options: FloorLineOptions,
+    options: FloorLineOptions = FloorLineOptions(),
 ) -> int:
     """Write nan for the readings of scans (S, B) on a line or beyond, in place; returns how many those were.
 

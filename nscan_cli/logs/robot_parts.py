@@ -105,7 +105,7 @@ class ScanTable(NamedTuple):
         return found
 
 
-def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
+def robot_parts(table: ScanTable, options: RobotPartsOptions = RobotPartsOptions()) -> list[Sector]:
     """The sectors in which the robot itself is in view, by increasing bearing; none if it never turns."""
     # Increasing ones, of the scan with the finest step.
     bearings = np.sort(table.bearings(int(np.argmin(np.abs(table.angle_increment)))))

@@ -39,10 +39,7 @@ from nscan_cli.logs.whole_revolution import WholeRevolutionOptions
 
 @dataclass(frozen=True)
 class ScanCheckOptions:
-    """The options of reading, as the provenance of a graph has them.
-
-    `laser_log` passes on those of its steps. Readers have the defaults of the others.
-    """
+    """The options of reading, as the provenance of a graph has them: the defaults of its steps."""
 
     stamp_unit: StampUnitOptions = field(default_factory=StampUnitOptions)
     """Whether stamps are in seconds."""
