@@ -161,16 +161,15 @@ def _is_value_of(value: Any, kind: str) -> bool:
     if value is None:
         return "None" in kind
     if isinstance(value, list) and kind.startswith("tuple[tuple"):
-        pairs = all(isinstance(part, list) and len(part) == 2 for part in value)
-        return pairs and all(_is_value_of(each, "float") for part in value for each in part)
+        return all(_are_numbers(part, 2) for part in value)
     if isinstance(value, list):
-        return (
-            kind.startswith("tuple")
-            and len(value) == 3
-            and all(_is_value_of(part, "float") for part in value)
-        )
-    if isinstance(value, bool) or kind == "bool":
-        return isinstance(value, bool) and kind == "bool"
+        return kind.startswith("tuple") and _are_numbers(value, 3)
+    if isinstance(value, bool):
+        return kind == "bool"
     if isinstance(value, str):
         return kind.startswith("str")
     return kind.startswith("float") and isinstance(value, (int, float)) and abs(value) <= DISTANCE.value
+
+
+def _are_numbers(value: Any, count: int) -> bool:
+    return isinstance(value, list) and len(value) == count and all(_is_value_of(x, "float") for x in value)
