@@ -80,9 +80,7 @@ def read_recording(data: FileBytes, file: str, salvage: bool) -> Recording:
     With `salvage`, damaged parts are left out, with a warning in the recording; else they are an error.
     Raises InputDataError and LimitExceededError.
     """
-    reader = _McapReader(data, file, salvage)
-    reader.read()
-    return reader.recording
+    return _McapReader(data, file, salvage).read()
 
 
 class _McapReader:
@@ -94,7 +92,7 @@ class _McapReader:
         self.recording = Recording("MCAP")
         self.checked = True
 
-    def read(self) -> None:
+    def read(self) -> Recording:
         """Read the whole file."""
         summary = self._read_summary()
         try:
@@ -120,6 +118,7 @@ class _McapReader:
             self.recording.checksums = "some do not fit, or cannot be checked"
         else:
             self.recording.checksums = "they fit" if self.checked else "the file has none of its messages"
+        return self.recording
 
     def _lost(self, at: int | None, problem: str) -> None:
         """Damage: an error, or under --salvage a warning."""
@@ -282,6 +281,4 @@ def _stream(data: FileBytes, begin: int, stop: int) -> Any:
 
 
 def _in_one_line(error: BaseException) -> str:
-    """The text of an error, or its type where it has none."""
-    text = " ".join(str(error).split())
-    return text if text else type(error).__name__
+    return " ".join(str(error).split()) or type(error).__name__

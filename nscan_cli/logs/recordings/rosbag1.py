@@ -40,9 +40,7 @@ WHOLE_READ = "its messages were found by reading all of it"
 
 def read_recording(data: FileBytes, file: str, salvage: bool) -> Recording:
     """The messages in order of their log times. Raises InputDataError and LimitExceededError."""
-    reader = _BagReader(data, file, salvage)
-    reader.read()
-    return reader.recording
+    return _BagReader(data, file, salvage).read()
 
 
 class _BagReader:
@@ -53,7 +51,7 @@ class _BagReader:
         """Byte where a chunk begins → number of its messages by connection."""
         self.recording = Recording("ROS 1 bag")
 
-    def read(self) -> None:
+    def read(self) -> Recording:
         """Read the whole file."""
         try:
             header = record_at(self.data, len(BAG_MAGIC), len(self.data))
@@ -76,6 +74,7 @@ class _BagReader:
             self.recording.warnings.append(f"the index of the bag is wrong: {WHOLE_READ}")
         for messages in self.recording.messages.values():
             messages.sort(key=lambda message: message.log_time)
+        return self.recording
 
     def _read_index(self, index_at: int) -> dict[int, dict[int, int]] | None:
         """What `in_chunks` should be by the index; None when it cannot be read. Adds its connections."""
