@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,7 +43,6 @@ class MovingMount:
 
     poses: Array
     """(n, 4, 4), n > 1"""
-    options: MountingOptions = field(default_factory=MountingOptions)
 
     @property
     def hangs(self) -> bool:
@@ -55,17 +54,6 @@ class MovingMount:
         """(n,) rad between the laser's axis and the vertical, either way up; up to π where it turns over."""
         up = self.poses[:, 2, 2] * (-1 if self.hangs else 1)
         return np.arccos(np.clip(up, -1.0, 1.0))
-
-    @property
-    def turns(self) -> Array:
-        """(n,) rad about the vertical, from the mean."""
-        return np.asarray(wrap(self._yaws - self.mount[2]))
-
-    @property
-    def shifts(self) -> Array:
-        """(n,) m, horizontal distances from the mean."""
-        distances: Array = np.hypot(*(self.poses[:, :2, 3] - self.mount[:2]).T)
-        return distances
 
     @property
     def mount(self) -> Array:
@@ -82,7 +70,7 @@ class MovingMount:
     @property
     def nods(self) -> bool:
         """Whether it is tilted by more than a robot rocks."""
-        return bool(self.tilts.max() >= self.options.rocking)
+        return bool(self.tilts.max() >= MountingOptions.rocking)
 
     def extent(self) -> str:
         """How far a laser moves that rocks, as the end of a sentence."""
@@ -94,12 +82,11 @@ class MovingMount:
         """Why no map can be made of the scans, as the predicate of "the laser …"; empty when one can."""
         if self.nods:
             return self._nodding()
-        if np.abs(self.turns).max() > self.options.turn:
+        if np.abs(wrap(self._yaws - self.mount[2])).max() > MountingOptions.turn:
             low, high = _degrees_span(self._yaws)
             return "pans" + (_full_turns(low, high) or f", from {low:.1f}° to {high:.1f}°")
-        if self.shifts.max() > self.options.shift:
-            return f"slides, by up to {self.shifts.max():.2f} m to either side"
-        return ""
+        shift = np.hypot(*(self.poses[:, :2, 3] - self.mount[:2]).T).max()
+        return f"slides, by up to {shift:.2f} m to either side" if shift > MountingOptions.shift else ""
 
     def _nodding(self) -> str:
         """A laser nods about its y axis when its x axis tilts most, else it rolls about its x axis."""
