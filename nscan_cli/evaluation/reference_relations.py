@@ -109,10 +109,7 @@ def read_relations(path: str) -> ReferenceRelations:
 
 
 def relation_errors(
-    trajectory: Trajectory,
-    relations: ReferenceRelations,
-    name: str = "result",
-    options: EvaluationOptions = EvaluationOptions(),
+    trajectory: Trajectory, relations: ReferenceRelations, name: str = "result"
 ) -> RelationErrors:
     """The errors of a trajectory; `name` is what a message calls it.
 
@@ -122,7 +119,7 @@ def relation_errors(
     """
     rows = nearest_in_time(trajectory.times, relations.times.ravel()).reshape(-1, 2)
     distance = np.abs(trajectory.times[rows] - relations.times).max(axis=1)
-    used = np.flatnonzero(distance <= options.tolerance)
+    used = np.flatnonzero(distance <= EvaluationOptions.tolerance)
     if len(used) == 0:
         raise no_match(name, trajectory.times, relations.name, relations.times.ravel())
     rows = rows[used]

@@ -27,17 +27,7 @@ class OdometryGapOptions:
     value lets the robot stand longer there."""
 
 
-DEFAULT_ODOMETRY_GAPS = OdometryGapOptions()
-
-
-def interpolated_poses(
-    times: Array,
-    at: Array,
-    poses: Array,
-    name: str,
-    warnings: list[str],
-    options: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS,
-) -> Array | None:
+def interpolated_poses(times: Array, at: Array, poses: Array, name: str, warnings: list[str]) -> Array | None:
     """Poses (S, 3) at `times` (S,), interpolated between `poses` (P, 3) at the sorted times `at` (P,).
 
     Linear in x, y and the unwrapped angle; nan far beyond the first and the last pose, and in gaps between
@@ -50,13 +40,12 @@ def interpolated_poses(
             f"go from {times[0]:.3f} s to {times[-1]:.3f} s; no odometry"
         )
         return None
-    angles = np.unwrap(poses[:, 2])
-    columns = (poses[:, 0], poses[:, 1], angles)
+    columns = (poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2]))
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    in_gap, nearest = _in_gap(times, at, poses, options), nearest_in_time(at, times)
+    in_gap, nearest = _in_gap(times, at, poses), nearest_in_time(at, times)
     found[in_gap] = poses[nearest[in_gap]]
-    margin = options.beyond * usual_period(at)
+    margin = OdometryGapOptions.beyond * usual_period(at)
     missing = in_gap & (np.abs(times - at[nearest]) > margin)
     missing |= (times < at[0] - margin) | (times > at[-1] + margin)
     if missing.any():
@@ -76,17 +65,15 @@ def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
 
 
 def _scans(first: int, last: int) -> str:
-    """Some scans that follow each other, by their numbers."""
     return f"scan {first}" if first == last else f"scans {first} to {last}"
 
 
-def _in_gap(times: Array, at: Array, poses: Array, options: OdometryGapOptions) -> NDArray[np.bool_]:
+def _in_gap(times: Array, at: Array, poses: Array) -> NDArray[np.bool_]:
     """(S,) which of the `times` (S,) lie in a gap between two poses (P, 3) at times (P,)."""
     periods = np.diff(at)
     steps = np.abs(relative(poses[1:], poses[:-1]))
-    is_gap = (periods > options.periods * usual_period(at)) & (
-        np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > options.motion
-    )
+    is_gap = periods > OdometryGapOptions.periods * usual_period(at)
+    is_gap &= np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > OdometryGapOptions.motion
     after = np.searchsorted(at, times)
     found: NDArray[np.bool_] = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))
     return found

@@ -55,11 +55,8 @@ class OdometryOutlierOptions:
     believes more."""
 
 
-DEFAULT_ODOMETRY_OUTLIERS = OdometryOutlierOptions()
-
-
 def without_outliers(
-    odometry: Array, times: Array, options: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS
+    odometry: Array, times: Array, options: OdometryOutlierOptions = OdometryOutlierOptions()
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, steady where single values are wrong; and what to say.
 
@@ -165,7 +162,7 @@ def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> 
     return found
 
 
-def usual_longest_step(poses: Array, options: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS) -> Array:
+def usual_longest_step(poses: Array, options: OdometryOutlierOptions = OdometryOutlierOptions()) -> Array:
     """(2,) length, m, and turn, rad, of the usual longest step between poses (n, 3), three at least."""
     steps = step_sizes(poses[1:], poses[:-1])
     least = np.minimum(np.minimum(steps[1:], steps[:-1]), step_sizes(poses[2:], poses[:-2]))

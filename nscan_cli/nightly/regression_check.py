@@ -104,13 +104,7 @@ class CheckResult:
         return self.status in ("failed", "above")
 
 
-def check_log(
-    entry: ManifestEntry,
-    runs: list[RunRecord],
-    notes: list[str],
-    absent: bool,
-    options: RegressionOptions = RegressionOptions(),
-) -> CheckResult:
+def check_log(entry: ManifestEntry, runs: list[RunRecord], notes: list[str], absent: bool) -> CheckResult:
     """Check a log of the manifest. It has at least one run, unless it is `absent`."""
     done = [run for run in runs if run["outcome"] == "done"]
     last, previous = (done[-1] if done else None), (done[-2] if len(done) > 1 else None)
@@ -118,18 +112,14 @@ def check_log(
     if absent:
         status, reasons = "absent", [f"{entry.inputs['log'].name} is missing"]
     else:
-        status, reasons = _status_and_reasons(entry, runs, last, previous, options)
+        status, reasons = _status_and_reasons(entry, runs, last, previous)
     if last is not None:
         notes = [*notes, *last["counts"]["warnings"]]
     return CheckResult(entry, status, reasons, runs, last, previous, notes)
 
 
 def _status_and_reasons(
-    entry: ManifestEntry,
-    runs: list[RunRecord],
-    last: RunRecord | None,
-    previous: RunRecord | None,
-    options: RegressionOptions,
+    entry: ManifestEntry, runs: list[RunRecord], last: RunRecord | None, previous: RunRecord | None
 ) -> tuple[Status, list[str]]:
     if runs[-1]["outcome"] != "done":
         return "failed", [runs[-1]["reason"]]
@@ -149,6 +139,7 @@ def _status_and_reasons(
     earlier = MeasuredErrors.of(previous)
     if earlier is None or earlier.measure != errors.measure:
         return "good", []
+    options = RegressionOptions()
     worse = [
         f"{errors.measure} rose from {old:.4f} to {new:.4f} {unit}"
         for old, new, least, unit in (

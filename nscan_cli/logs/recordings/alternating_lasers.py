@@ -41,11 +41,9 @@ class TwoLaserOptions:
     value finds fewer lasers."""
 
 
-def first_of_two_lasers(
-    messages: Sequence[TimedScan], options: TwoLaserOptions = TwoLaserOptions()
-) -> tuple[list[TimedScan], str]:
+def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
     """The scans of the first laser alone, and the message for the user; all scans if there is one laser."""
-    scans = [message.scan for message in messages]
+    scans, options = [message.scan for message in messages], TwoLaserOptions()
     if not _alternate(scans, options):
         return list(messages), ""
     is_first = _is_first(scans, options)

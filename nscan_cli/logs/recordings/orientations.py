@@ -34,16 +34,13 @@ class OrientationOptions:
     more recordings."""
 
 
-def headings_of(
-    poses: Sequence[Pose3D],
-    way: HeadingUnitOptions = HeadingUnitOptions(),
-    options: OrientationOptions = OrientationOptions(),
-) -> tuple[list[float | None], str]:
+def headings_of(poses: Sequence[Pose3D]) -> tuple[list[float | None], str]:
     """The headings (rad) of n poses, None where one is not valid, and what was put right; empty for nothing.
 
     They are read otherwise than as quaternions if many are no rotations about the vertical, and the robot
     drives along what else they may mean, but not along what they say.
     """
+    way, options = HeadingUnitOptions(), OrientationOptions()
     said = [heading(pose) for pose in poses]
     known: Array = np.array([np.nan if angle is None else angle for angle in said], dtype=np.float64)
     rotations = np.array([pose.rotation for pose in poses], dtype=np.float64).reshape(-1, 4)

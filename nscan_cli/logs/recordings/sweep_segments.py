@@ -40,14 +40,12 @@ class TimedScan(NamedTuple):
     """ns, when it was recorded."""
 
 
-def joined_sweeps(
-    messages: Sequence[TimedScan], options: SweepSegmentOptions = SweepSegmentOptions()
-) -> tuple[list[TimedScan], str]:
+def joined_sweeps(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
     """The scans with the segments of each sweep put together, and the message; as they are if none are.
 
     A scan has the times of the segment in its middle. Beams of segments that are missing are nan.
     """
-    scans = [message.scan for message in messages]
+    scans, options = [message.scan for message in messages], SweepSegmentOptions()
     places, beams_a_sweep = _places(scans, options)
     if not len(places):
         return list(messages), ""
