@@ -14,9 +14,8 @@ from nscan_cli.calibration.odometry_options import HeldOdometryOptions
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Array, Indices, relative
 
 

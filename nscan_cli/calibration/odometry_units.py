@@ -10,9 +10,8 @@ from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scaled_steps import with_scaled_steps
 from nscan_cli.calibration.step_sampling import possible_steps
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.range_unit import UNITS
-from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Indices, Mask, relative
 
 

@@ -19,8 +19,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.range_jumps import lead_one_way, pairs_across, scans_to_match
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.matching.scan_pairs import ScanPair, match_scans
 from nscan_cli.poses import MIRRORED, Mask
 

@@ -21,8 +21,7 @@ from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.range_jump_options import RangeJumpOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.poses import Array, compose, wrap
 

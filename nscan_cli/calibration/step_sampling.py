@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.repeated_rows import differ_from_last
+from nscan_cli.logs.steady_way import differ_from_last
 from nscan_cli.poses import Indices, relative
 
 

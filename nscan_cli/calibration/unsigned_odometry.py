@@ -14,8 +14,7 @@ from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scaled_steps import with_scaled_steps
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.poses import Array, Indices, are_known, compose, relative
 
 REVERSED = np.array([-1.0, -1.0, 1.0])

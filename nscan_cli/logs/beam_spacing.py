@@ -8,25 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nscan_cli.logs.beam_angles import BeamDirections
-from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.laser_log import beam_counts
+from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.wall_angles import (
+    BeamSpacingOptions,
     SampledScans,
     beams_as_log,
     factors_by_walls,
     most_told_factor,
     sampled_scans,
 )
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.range_limits import RangeLimits
 
 
 def checked_by_walls(

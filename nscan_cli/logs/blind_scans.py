@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.poses import Indices
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.beam_angles import BeamDirections
+from nscan_cli.logs.mask_runs import stretch_names
 from nscan_cli.logs.robot_parts import ScanTable, ranges_at
-from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Indices
 
 

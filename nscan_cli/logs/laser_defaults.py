@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
-from nscan_cli.logs.range_peaks import peak_at_limit
+from nscan_cli.logs.range_peaks import RangeLimitOptions, peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
 RAD_PER_DEGREE = math.pi / 180

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_defaults import no_return_value
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
-from nscan_cli.logs.range_peaks import ROUNDING, peak_at_limit
+from nscan_cli.logs.range_peaks import ROUNDING, RangeLimitOptions, peak_at_limit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_limits import RangeLimits
+from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.raw_scans import RawScans
 
 UNITS = (("millimetres", 0.001), ("centimetres", 0.01))

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 from nscan_cli.logs.angle_unit import AngleUnitOptions
 from nscan_cli.logs.beam_angles import BeamAngleOptions
-from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.blind_scans import BlindScanOptions
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.direction_changes import DirectionChangeOptions
@@ -15,7 +14,7 @@ from nscan_cli.logs.heading_unit import HeadingUnitOptions
 from nscan_cli.logs.noisy_odometry import NoisyOdometryOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
+from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
 from nscan_cli.logs.recordings.moving_mount import MountingOptions
@@ -34,6 +33,7 @@ from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
 from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.logs.two_odometries import TwoOdometriesOptions
 from nscan_cli.logs.unit_stretches import UnitStretchOptions
+from nscan_cli.logs.wall_angles import BeamSpacingOptions
 from nscan_cli.logs.whole_revolution import WholeRevolutionOptions
 
 

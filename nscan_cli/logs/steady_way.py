@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from nscan_cli.logs.repeated_rows import differ_from_last
+import numpy as np
+from numpy.typing import NDArray
+
 from nscan_cli.logs.scan_order import usual_period
 from nscan_cli.poses import Array, Indices, Mask, wrap
 
 Places = tuple[int, int, int]
 """How many rows behind a given one the pose before, the pose itself, and the pose behind are."""
+
+
+def differ_from_last(rows: NDArray[Any]) -> Mask:
+    """(n,) which of rows (n, d) differ from the one before; the first one does."""
+    differ: Mask = np.ones(len(rows), dtype=np.bool_)
+    differ[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return differ
 
 
 def new_poses(poses: Array, times: Array) -> Indices:

@@ -13,8 +13,8 @@ import numpy as np
 from nscan_cli.files.text import counted
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.odometry_outliers import step_sizes, usual_longest_step
-from nscan_cli.logs.repeated_rows import differ_from_last
 from nscan_cli.logs.robot_path import steady_between
+from nscan_cli.logs.steady_way import differ_from_last
 from nscan_cli.poses import Array, Indices, are_known
 
 

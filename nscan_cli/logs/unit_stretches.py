@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.text import shortened_list
-from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.range_unit import UNITS, RangeUnitOptions, scaled
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.scan_order import ScanOrder
-from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Array, Indices, Mask
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_limits import RangeLimits
+from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.range_unit import wrong_unit
 from nscan_cli.poses import Array
 

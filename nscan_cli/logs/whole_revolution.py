@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nscan_cli.files.text import counted
 from nscan_cli.logs.beam_angles import BeamDirections
-from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.laser_log import beam_counts
+from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.wall_angles import sampled_scans
+from nscan_cli.logs.wall_angles import BeamSpacingOptions, sampled_scans
 from nscan_cli.poses import Array
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.range_limits import RangeLimits
 
 
 @dataclass(frozen=True)

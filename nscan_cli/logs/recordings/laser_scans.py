@@ -13,7 +13,7 @@ from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.copies import without_copies
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.range_limit_options import RangeLimitOptions
+from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers

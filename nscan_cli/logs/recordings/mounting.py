@@ -14,8 +14,8 @@ from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
 from nscan_cli.logs.recordings.moving_mount import MountingOptions, MovingMount, moving_mount
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, planar_mount
-from nscan_cli.logs.recordings.tf_chains import ChainLink, chain_links, composed, shortest_chain
-from nscan_cli.logs.recordings.tf_tree import FramePair, TransformTree
+from nscan_cli.logs.recordings.tf_chains import ChainLink, FramePair, chain_links, composed, shortest_chain
+from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.poses import Array
 
 

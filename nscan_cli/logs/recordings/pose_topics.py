@@ -10,7 +10,8 @@ from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import StampedTransform, decimal_seconds
 from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES
 from nscan_cli.logs.recordings.poses_3d import heading
-from nscan_cli.logs.recordings.tf_tree import FramePair, constant_transforms, decoded_transforms
+from nscan_cli.logs.recordings.tf_chains import FramePair
+from nscan_cli.logs.recordings.tf_tree import constant_transforms, decoded_transforms
 from nscan_cli.logs.recordings.topics import type_problem
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array

@@ -5,16 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, inverse_transform
 from nscan_cli.poses import Array
 
-if TYPE_CHECKING:
-    from nscan_cli.logs.recordings.tf_tree import FramePair
-
+FramePair = tuple[str, str]
+"""Parent frame and child frame."""
 AT_ANY_TIME = np.zeros(1, dtype=np.int64)
 """The only time of a fixed transform."""
 

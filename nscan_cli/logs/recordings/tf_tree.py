@@ -11,12 +11,11 @@ from nscan_cli.logs.recordings.message_stamps import valid_stamps
 from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES
 from nscan_cli.logs.recordings.moving_mount import MountingOptions
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, as_matrix
+from nscan_cli.logs.recordings.tf_chains import FramePair
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 STATIC = "tf_static"
-FramePair = tuple[str, str]
-"""Parent frame and child frame."""
 LoggedTransform = tuple[StampedTransform, int]
 """A transform, and the time (ns) when its message was recorded."""
 

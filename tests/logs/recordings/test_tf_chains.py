@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.recordings.decoded_messages import Pose3D, StampedTransform
 from nscan_cli.logs.recordings.poses_3d import as_matrix, planar_mount
-from nscan_cli.logs.recordings.tf_chains import chain_links, composed, shortest_chain
-from nscan_cli.logs.recordings.tf_tree import FramePair, constant_transforms
+from nscan_cli.logs.recordings.tf_chains import FramePair, chain_links, composed, shortest_chain
+from nscan_cli.logs.recordings.tf_tree import constant_transforms
 from nscan_cli.poses import Array, compose, wrap
 from tests.logs.recordings.messages import turned
 from tests.logs.recordings.test_poses_3d import POSES
