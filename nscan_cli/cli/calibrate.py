@@ -192,7 +192,6 @@ def _sweep_lines(calibration: Calibration) -> list[str]:
 
 
 def _unknown(calibration: Calibration) -> list[str]:
-    """The values that the drive leaves open, and why, one line for each reason."""
     by_reason: dict[str, list[str]] = {}
     for name in calibration.open:
         by_reason.setdefault(calibration.values[name].why_open, []).append(name)
@@ -228,5 +227,4 @@ def _value_facts(name: str, estimate: Estimate) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """With six significant digits."""
     return float(f"{value:.6g}") + 0.0

@@ -111,7 +111,6 @@ def _file_named(name: str, folder: Path) -> Path | None:
 
 
 def _folders(folder: Path) -> list[Path]:
-    """The folders in a folder, sorted; none if it cannot be read."""
     try:
         return sorted(path for path in folder.iterdir() if path.is_dir())
     except OSError:
@@ -119,7 +118,6 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def _graph_inputs(graph: Graph) -> list[dict[str, Any]]:
-    """The records of the files that the graph was made from."""
     inputs: list[dict[str, Any]] = graph.provenance.get("inputs") or []
     return inputs
 

@@ -49,7 +49,6 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
 
 
 def _contradictions(log: LaserLog, reading: ReadingOptions) -> list[str]:
-    """What the scans of a log contradict of its file, as slam says it."""
     from nscan_cli.calibration.file_check import checked_file
     from nscan_cli.calibration.options import FileCheckOptions
 

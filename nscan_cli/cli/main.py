@@ -163,7 +163,6 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 
 def _usage_line(error: click.ClickException) -> str:
-    """The message of click in one line, with the command and its help."""
     problem = usage_problem(error)
     context = getattr(error, "ctx", None)
     if context is None:

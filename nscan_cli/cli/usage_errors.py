@@ -35,7 +35,6 @@ def value_problem(kind: click.ParamType[Any], value: Any, metavar: str | None) -
 
 
 def _range_text(kind: Any) -> str:
-    """The range of a number in words."""
     low, high = kind.min, kind.max
     if low is not None and high is not None and not kind.min_open and not kind.max_open:
         return f"from {low:g} to {high:g}"
@@ -45,7 +44,6 @@ def _range_text(kind: Any) -> str:
 
 
 def _options_begun(error: click.NoSuchOption) -> list[str]:
-    """The options of the command that begin like the one that it does not have."""
     params = [] if error.ctx is None else error.ctx.command.params
     names = (name for param in params if isinstance(param, click.Option) for name in param.opts)
     return [name for name in names if name.startswith(error.option_name)]

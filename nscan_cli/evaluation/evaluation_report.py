@@ -81,7 +81,6 @@ def evaluation_text(evaluation: Evaluation) -> str:
 
 
 def _alignment_note(alignment: Alignment) -> str:
-    """A note where the headings decide the alignment; else empty."""
     if alignment.by == "positions":
         return ""
     return (
@@ -131,7 +130,6 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
 
 
 def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
-    """The motion from the result to the reference, what decides its angle, and the number of pairs."""
     x, y, angle = errors.alignment.motion.tolist()
     return {
         "translation": [round(x, 9) + 0.0, round(y, 9) + 0.0],

@@ -178,7 +178,6 @@ def _lag_and_lever(
 
 
 def _certain_lever_arm(poses: Array, truth: Array, options: RemarkOptions) -> LeverArm | None:
-    """The lever arm; None where it is not certain."""
     found = lever_arm(poses, truth, options.max_condition)
     if found is None or np.hypot(*found.point) < max(options.min_lever, options.min_sigmas * found.sigma):
         return None

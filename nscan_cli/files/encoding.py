@@ -24,7 +24,6 @@ def without_byte_order_mark(data: bytes, name: str) -> bytes:
 
 
 def _has_wide_characters(begin: bytes) -> bool:
-    """Whether ASCII characters alternate with zeros."""
     halves = begin[::2], begin[1::2]
     return len(begin) >= 8 and any(
         not any(zeros) and all(9 <= byte < 127 for byte in characters)

@@ -219,7 +219,6 @@ def _messages(form: Form, data: FileBytes, path: str, salvage: bool, warnings: l
 
 
 def _source(stored: FileBytes, path: str) -> Source:
-    """Name, hash and size of the file and of the journals beside it."""
     name = base_name(path)
     sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)
     journals = [
@@ -231,7 +230,6 @@ def _source(stored: FileBytes, path: str) -> Source:
 
 
 def _joint_source(name: str, files: Sequence[Source]) -> Source:
-    """Several files as one source."""
     return Source(
         name, common_hash(file.sha256 for file in files), sum(file.bytes for file in files), tuple(files)
     )
@@ -239,7 +237,6 @@ def _joint_source(name: str, files: Sequence[Source]) -> Source:
 
 @contextmanager
 def _limits_as_input_errors(file: str) -> Iterator[None]:
-    """Turn a LimitExceededError into an InputDataError that names the file."""
     try:
         yield
     except LimitExceededError as error:
@@ -247,13 +244,11 @@ def _limits_as_input_errors(file: str) -> Iterator[None]:
 
 
 def _check_usable(log: LaserLog, even_unusable: bool) -> None:
-    """Raise the InputDataError of a log without usable readings, unless `even_unusable`."""
     if log.report.unusable is not None and not even_unusable:
         raise log.report.unusable
 
 
 def _with_warnings(log: LaserLog, warnings: Sequence[str]) -> LaserLog:
-    """The log with more warnings, before its own."""
     if not warnings:
         return log
     return replace(log, report=replace(log.report, warnings=(*warnings, *log.report.warnings)))

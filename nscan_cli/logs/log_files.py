@@ -202,7 +202,6 @@ def _listed_files(folder: Path, warnings: list[str]) -> list[str]:
 
 
 def _is_recording(path: Path) -> bool:
-    """Whether a file is a recording by its first bytes or by its name."""
     if not path.is_file():
         return False
     head = first_bytes(str(path))

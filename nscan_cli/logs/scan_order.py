@@ -167,5 +167,4 @@ def selected_numbers(times: Array, options: ReadingOptions, file: str) -> NDArra
 
 
 def _seconds(stamp: str) -> float:
-    """The time in a stamp, or nan."""
     return float(stamp) if STAMP.fullmatch(stamp) else np.nan

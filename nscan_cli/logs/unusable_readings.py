@@ -96,7 +96,6 @@ def _readings(count: int) -> str:
 
 
 def _limit_texts(limits: RangeLimits) -> tuple[str, str]:
-    """Both limits and their origin, as text."""
     return (f"{_metres(limits.low)} ({limits.low_from})", f"{_metres(limits.high)} ({limits.high_from})")
 
 

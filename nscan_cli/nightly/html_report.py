@@ -104,12 +104,10 @@ def _real_time_factor(check: CheckResult) -> str:
 
 
 def _readable_time(when: str) -> str:
-    """A time in ISO 8601 (UTC) as people write it."""
     return when.replace("T", " ").replace("Z", " UTC")
 
 
 def _map_viewer(results: Path) -> Markup | None:
-    """The viewer of the map; None if its file is missing."""
     from markupsafe import Markup
 
     try:
@@ -119,7 +117,6 @@ def _map_viewer(results: Path) -> Markup | None:
 
 
 def _has_history(check: CheckResult) -> bool:
-    """Whether a run was measured or failed."""
     return any(run["outcome"] != "done" or MeasuredErrors.of(run) is not None for run in check.runs)
 
 

@@ -140,7 +140,6 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
 
 
 def _origin_keys(role: str) -> tuple[str, str]:
-    """The keys of a file's address and of its SHA-256."""
     return ("source", "sha256") if role == "log" else (f"{role}_source", f"{role}_sha256")
 
 

@@ -77,7 +77,6 @@ def _with_what_is_there(entry: ManifestEntry) -> tuple[ManifestEntry, list[str]]
 
 
 def _with_sources(entry: ManifestEntry, error: str) -> str:
-    """The error, and where the missing files can be downloaded."""
     missing = [role for role, path in entry.inputs.items() if not path.exists()]
     known = [entry.sources[role] for role in missing if role in entry.sources]
     return f"{error}; download from {' and '.join(known)}" if known else error

@@ -110,7 +110,6 @@ def _recording_delay(stamps: Sequence[int | None], log_times: Sequence[int]) -> 
 
 
 def _scan_problem(scan: ScanMessage) -> str:
-    """Why a scan cannot be used; empty when it can."""
     problem = beams_problem(len(scan.ranges))
     if not (abs(scan.angle_min) <= MAX_ANGLE and 0 < abs(scan.angle_increment) <= MAX_ANGLE):
         problem = problem or "an angle is out of bounds"

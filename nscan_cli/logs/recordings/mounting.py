@@ -150,13 +150,11 @@ def _poses_in_scans(scans: Sequence[ScanMessage]) -> list[ChainLink]:
 def _moving_laser(
     mount: MovingMount, links: Sequence[ChainLink], frames: Sequence[str], file: str
 ) -> MountingError:
-    """The error that a laser moves on its robot so that no map can be made."""
     chain = f" (tf {' → '.join(frames)})" if len(frames) > 1 else ""
     problem = f"its laser {mount.problem()}: {_moving_links(links)}{chain}"
     return MountingError(file, problem, "give --mount X,Y,DEG to use a fixed mounting")
 
 
 def _moving_links(links: Sequence[ChainLink]) -> str:
-    """Which transforms of a chain move, as a sentence."""
     movers = [link.name for link in links if link.moves]
     return f"{' and '.join(movers)} move{'s' if len(movers) == 1 else ''}"

@@ -178,5 +178,4 @@ def _poses_at_scans(
 
 
 def _overlap(times: Array, others: Array) -> bool:
-    """Whether there are times (s) between the first and the last of the others."""
     return bool(((times >= others.min()) & (times <= others.max())).any())

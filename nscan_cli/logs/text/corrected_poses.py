@@ -35,7 +35,6 @@ def sign_of_correction(tags: Container[str], scans: CarmenScans) -> str:
 
 
 def _is_six_digit_stamp(stamp: str) -> bool:
-    """Whether a stamp could be printed by %g."""
     try:
         return f"{float(stamp):g}" == stamp
     except ValueError:

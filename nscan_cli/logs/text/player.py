@@ -95,7 +95,6 @@ def _begin_at_zero(scans: PlayerScans) -> bool:
 
 
 def _version(data: bytes) -> Version | None:
-    """The version of Player that wrote the log, or None if it is no Player log."""
     if b"\0" in data[:512]:
         return None
     lines = (line.group(1) for line in FIRST_LINE.finditer(data, 0, 1 << 16))

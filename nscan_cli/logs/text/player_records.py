@@ -176,6 +176,5 @@ def _scan_record(line: PayloadLine, head: int, skips: Skips) -> tuple[LineRecord
 
 
 def _is_plausible(head: Array, version: Version) -> bool:
-    """Whether angles, step and pose before the ranges are within bounds."""
     angles = head[ANGLES[version]]
     return within_bounds(head) and bool(np.abs(angles).max() <= MAX_ANGLE) and angles[2] != 0
