@@ -84,6 +84,7 @@ def _trajectory_or_log(
     """The trajectory or the log in the bytes that `path` has."""
     name = label(path)
     data, lost = content_of(stored, path, options.salvage)
+    assert isinstance(data, bytes)
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")
     is_graph = data.lstrip().startswith(b"{")

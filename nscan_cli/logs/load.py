@@ -88,7 +88,7 @@ def stored_bytes(path: str) -> FileBytes:
 
 def recording_from(stored: FileBytes, path: str, salvage: bool) -> Recording | None:
     """The messages of the recording at `path`, or None if it is no recording. Raises InputDataError."""
-    data, lost = _content(stored, path, salvage)
+    data, lost = content_of(stored, path, salvage)
     form = next((form for form in FORMS if form.container and form.fits(data)), None)
     if form is None:
         return None
@@ -114,7 +114,7 @@ def log_from(
 ) -> LaserLog:
     """The log in the stored bytes of `path`. Raises the errors of read_log."""
     name = label(path)
-    data, lost = _content(stored, path, options.salvage)
+    data, lost = content_of(stored, path, options.salvage)
     if not re.search(rb"\S", data):
         raise InputDataError(name, lost[0] if lost else "is empty", "give a log with laser scans")
     form = _form(data, name)
@@ -144,11 +144,13 @@ def log_from(
     return log
 
 
-def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, list[str]]:
+def content_of(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, list[str]]:
     """The decompressed bytes of `path`, and with `salvage` a warning about what was lost.
 
-    Raises InputDataError if they are damaged or too many.
+    A mapped file is not compressed. Raises InputDataError if the bytes are damaged or too many.
     """
+    if not isinstance(stored, bytes):
+        return stored, []
     packing = compression_of(stored)
     if packing is None:
         return without_byte_order_mark(stored, label(path)), []
@@ -162,11 +164,6 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, list[str
     return content, [f"{problem}: the rest is lost"]
 
 
-def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, list[str]]:
-    """The decompressed bytes and warnings, as of content_of; a mapped file is not compressed."""
-    return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, [])
-
-
 def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
     """The messages in several files of one recording, and the files. One file at a time is in memory."""
     found: list[tuple[str, Recording, Source]] = []
@@ -174,7 +171,7 @@ def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
     with _limits_as_input_errors(parts.title):
         for path in parts.files:
             stored = stored_bytes(path)
-            data, lost = _content(stored, path, salvage)
+            data, lost = content_of(stored, path, salvage)
             form = _form(data, path)
             if not form.container:
                 problem = f"{path}: is {form.name}, not a recording"
