@@ -274,10 +274,7 @@ def _odometry(
         findings.used["odometry"] = "none: all poses are zero"
         findings.warnings.append("all poses are zero: the log is read as one without odometry")
         return None
-    findings.used["odometry"] = f"the poses in {tag}"
-    poses = scans.robot[times.rows]
-    poses[:, 2] = wrap(poses[:, 2])
-    return odometry_of_scans(times, poses, options, findings)
+    return odometry_of_scans(times, scans.robot, f"the poses in {tag}", options, findings)
 
 
 def _true_poses(

@@ -11,7 +11,7 @@ from nscan_cli.logs.heading_unit import HeadingUnitOptions, are_in_degrees
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, wrap
 
 HEADINGS_CONVERTED = (
     "the headings of odometry are in degrees, for the robot then drives along them: they are converted to "
@@ -37,12 +37,15 @@ def headings_in_radians(
 
 
 def odometry_of_scans(
-    scans: ScanOrder, poses: Array, options: ReadingOptions, findings: ReaderFindings
+    scans: ScanOrder, robot: Array, origin: str, options: ReadingOptions, findings: ReaderFindings
 ) -> Array | None:
-    """Poses (S, 3) at the times of the scans from those (S, 3) in the records of the scans, or None.
+    """Poses (S, 3) at the times of the scans from those (S, 3) in their records, in file order, or None.
 
     They are at the same times, unless an option says that the odometry's clock is off.
     """
+    findings.used["odometry"] = origin
+    poses = robot[scans.rows]
+    poses[:, 2] = wrap(poses[:, 2])
     if not options.clock_offset or scans.nominal:
         return poses
     at = scans.times + options.clock_offset

@@ -134,16 +134,12 @@ def _odometry(
     findings: ReaderFindings,
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: those in the scans, else those of a position device."""
-    used = findings.used
     if not options.odometry:
-        used["odometry"] = "none: --no-odometry"
+        findings.used["odometry"] = "none: --no-odometry"
         return None
     if scans.robot is not None and scans.robot.any() and options.odom_topic is None:
         headings_in_radians([scans.robot], times.rows, options, findings)
-        poses = scans.robot[times.rows]
-        poses[:, 2] = wrap(poses[:, 2])
-        used["odometry"] = "the poses in the scans (1:2)"
-        return odometry_of_scans(times, poses, options, findings)
+        return odometry_of_scans(times, scans.robot, "the poses in the scans (1:2)", options, findings)
     device, why = choose_device("odometry", options.odom_topic, findings.odometries, findings.skips.file)
     found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
     values, stamps = player_records.device_poses(found, findings.skips)
