@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.inputs import FileBytes, label, read_bytes
-from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
+from nscan_cli.files.inputs import FileBytes, label, limits_as_input_errors, read_bytes
+from nscan_cli.files.limits import GRAPH, MB
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
@@ -95,10 +95,8 @@ def _trajectory_or_log(
         told = log.report.notices()[0 if options.salvage else len(log.report.warnings) :]
         notices += [f"{name}: {notice}" for notice in told]
         return log
-    try:
+    with limits_as_input_errors(name):
         GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
-    except LimitExceededError as error:
-        raise InputDataError(name, str(error), error.remedy) from error
     if lost:
         notices += [f"{name}: {warning}" for warning in lost]
         # The last line may be cut off within a number.

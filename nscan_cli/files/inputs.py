@@ -29,18 +29,15 @@ def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
     Raises InputMissingError if the file is missing or cannot be read, and InputDataError if it is larger than
     the limit.
     """
-    try:
-        with _as_input_errors(path):
-            if path == STANDARD_INPUT:
-                return read_all(sys.stdin.buffer.read, limit)
-            with open(path, "rb") as file:
-                status = os.fstat(file.fileno())
-                if not stat.S_ISREG(status.st_mode):
-                    return read_all(file.read, limit)
-                limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
-                return file.read()
-    except LimitExceededError as error:
-        raise InputDataError(label(path), str(error), error.remedy) from error
+    with limits_as_input_errors(label(path)), _as_input_errors(path):
+        if path == STANDARD_INPUT:
+            return read_all(sys.stdin.buffer.read, limit)
+        with open(path, "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                return read_all(file.read, limit)
+            limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
+            return file.read()
 
 
 def memory_map(path: str) -> mmap.mmap:
@@ -53,6 +50,15 @@ def sha256_of(path: str) -> str:
     """The SHA-256 of a regular file, read in blocks. Raises InputMissingError."""
     with _as_input_errors(path), open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def limits_as_input_errors(file: str) -> Iterator[None]:
+    """Turn a LimitExceededError into an InputDataError that names the file."""
+    try:
+        yield
+    except LimitExceededError as error:
+        raise InputDataError(file, str(error), error.remedy) from error
 
 
 @contextlib.contextmanager
