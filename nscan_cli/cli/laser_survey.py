@@ -56,7 +56,6 @@ class Survey(NamedTuple):
             "used": used,
             "lasers": self.lasers,
             "odometries": [_device_facts(one) for one in found],
-            "corrected": report.corrected or None,
         }
 
     def without_unchosen(self, facts: dict[str, Any]) -> dict[str, Any]:

@@ -134,20 +134,17 @@ def _other_endings(entry: ManifestEntry) -> tuple[str, ...]:
 
 def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Executor:
     """The function that runs tasks, in processes here or on a cluster."""
+    if scheduler is not None:
+        from nscan_cli.nightly import dask_executor
+
+        return lambda tasks, _scratch, report: dask_executor.run_on_dask(tasks, scheduler, timeout, report)
+    from nscan_cli.nightly import local_executor
+    from nscan_cli.threads import available_threads
 
     def here(tasks: list[Task], scratch: Path, report: ProgressCallback) -> Outcomes:
-        from nscan_cli.nightly import local_executor
-        from nscan_cli.threads import available_threads
-
         side_by_side = min(jobs or available_threads(), len(tasks))
         # The remaining processors become threads of the logs.
         threads = max(1, available_threads() // side_by_side)
         return local_executor.run_locally(tasks, side_by_side, timeout, scratch, report, threads)
 
-    def there(tasks: list[Task], _scratch: Path, report: ProgressCallback) -> Outcomes:
-        from nscan_cli.nightly import dask_executor
-
-        assert scheduler is not None
-        return dask_executor.run_on_dask(tasks, scheduler, timeout, report)
-
-    return here if scheduler is None else there
+    return here
