@@ -45,6 +45,8 @@ class ReaderFindings:
     """What a reader collects for the report."""
 
     skips: Skips
+    options: ReadingOptions
+    """Those that it reads with."""
     records: dict[str, int] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     used: dict[str, str] = field(default_factory=dict)
@@ -83,17 +85,16 @@ def laser_log(
     mount: Array,
     motion: RecordedMotion,
     findings: ReaderFindings,
-    options: ReadingOptions,
 ) -> LaserLog:
     """The selected scans in order of time, with no-returns marked. `raw.ranges` may be overwritten.
 
     Raises WrongUsageError if the options select no scan.
     """
-    file = findings.skips.file
+    file, options = findings.skips.file, findings.options
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings, of_file = findings.warnings, len(findings.warnings)
-    raw, limits, contradictions = _in_metres(raw, times, options, findings)
+    raw, limits, contradictions = _in_metres(raw, times, findings)
     repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
         raw, converted = with_radians(raw)
@@ -245,9 +246,10 @@ def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingO
 
 
 def _in_metres(
-    raw: RawScans, times: ScanOrder, options: ReadingOptions, findings: ReaderFindings
+    raw: RawScans, times: ScanOrder, findings: ReaderFindings
 ) -> tuple[RawScans, RangeLimits, list[str]]:
     """The scans in metres, their limits, and messages if the scans contradict the unit of the log."""
+    options = findings.options
     if options.range_scale is not None:
         raw = scaled(raw, options.range_scale)
         return raw, limits_in_force(raw, options, findings.warnings), []

@@ -13,7 +13,8 @@ from nscan_cli.logs.compression import compression_of
 class Form(NamedTuple):
     """A form of log and the module that reads it, which is imported when such a log is met.
 
-    The module has `read` (see logs.load.Reader), and `recognises` if the form has no `magic`.
+    The module has `recognises(data)` if the form has no `magic`, and `read(data, file, source, options)`. It
+    returns a LaserLog, and raises InputDataError and WrongUsageError; `file` is the name for messages.
     """
 
     name: str
@@ -22,9 +23,11 @@ class Form(NamedTuple):
     """The first bytes of such a file; None if the module recognises it."""
     container: bool = False
     """Whether a file holds messages and may be one of several files of a recording. The module then has
-    `read_recording` (see logs.load.Container) instead of `read`."""
+    `read_recording(data, file, salvage)` instead of `read`, which returns a Recording, and also raises
+    LimitExceededError."""
     by_path: bool = False
-    """Whether the module also has `read_recording_file` (see logs.load.Database)."""
+    """Whether the module also has `read_recording_file(path, journals, file, salvage)`, for a file that is
+    not in memory, and its journals (log_files.journals_of)."""
 
     def fits(self, data: FileBytes) -> bool:
         """Whether the bytes of a file are of this form."""

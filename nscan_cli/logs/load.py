@@ -6,16 +6,22 @@ import hashlib
 import os
 import re
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from mmap import mmap
-from typing import Protocol
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.encoding import without_byte_order_mark
-from nscan_cli.files.inputs import FileBytes, base_name, common_hash, label, memory_map, read_bytes, sha256_of
-from nscan_cli.files.limits import LimitExceededError
+from nscan_cli.files.inputs import (
+    FileBytes,
+    base_name,
+    common_hash,
+    label,
+    limits_as_input_errors,
+    memory_map,
+    read_bytes,
+    sha256_of,
+)
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs.compression import compression_of, decompressed
 from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
@@ -24,30 +30,6 @@ from nscan_cli.logs.log_files import Parts, first_bytes, journals_of, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Recording
 from nscan_cli.logs.recordings.split_recordings import merge_recordings, start_of
-
-
-class Reader(Protocol):
-    """The interface of a module that reads a text form of log."""
-
-    def read(self, data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
-        """The scans; `file` is the name for messages. Raises InputDataError and WrongUsageError."""
-
-
-class Container(Protocol):
-    """The interface of a module that reads a container of messages."""
-
-    def read_recording(self, data: FileBytes, file: str, salvage: bool) -> Recording:
-        """The messages; `file` is the name for messages. Raises InputDataError and LimitExceededError."""
-
-
-class Database(Container, Protocol):
-    """The interface of a module that can also open the file itself."""
-
-    def read_recording_file(
-        self, path: str, journals: Mapping[str, str], file: str, salvage: bool
-    ) -> Recording:
-        """The messages in the file and in its journals (log_files.journals_of). Raises the same errors."""
-
 
 RESERVED_MEMORY = 4 << 20
 """Bytes that are freed when memory runs out, so that the error can be handled."""
@@ -92,7 +74,7 @@ def recording_from(stored: FileBytes, path: str, salvage: bool) -> Recording | N
     form = next((form for form in FORMS if form.container and form.fits(data)), None)
     if form is None:
         return None
-    with _limits_as_input_errors(label(path)):
+    with limits_as_input_errors(label(path)):
         return _messages(form, data, path, salvage, lost)
 
 
@@ -121,7 +103,7 @@ def log_from(
     source = _source(stored, path)
     # The bytes are freed before the scans are made.
     del stored
-    with _limits_as_input_errors(name):
+    with limits_as_input_errors(name):
         if form.container:
             # Text logs need no decoders of messages.
             from nscan_cli.logs.recordings.laser_scans import log_from_recording
@@ -131,11 +113,10 @@ def log_from(
             log = log_from_recording(recording, name, source, options)
         else:
             assert isinstance(data, bytes)
-            reader: Reader = form.reader()
             # Python 3.11 can loop for ever at the end of a `with` block when no memory at all is left.
             reserve = bytearray(RESERVED_MEMORY)
             try:
-                log = _with_warnings(reader.read(data, name, source, options), lost)
+                log = _with_warnings(form.reader().read(data, name, source, options), lost)
             except MemoryError as error:
                 del reserve
                 traceback.clear_frames(error.__traceback__)
@@ -154,7 +135,7 @@ def content_of(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, 
     packing = compression_of(stored)
     if packing is None:
         return without_byte_order_mark(stored, label(path)), []
-    with _limits_as_input_errors(label(path)):
+    with limits_as_input_errors(label(path)):
         content, problem = decompressed(stored, packing)
     content = without_byte_order_mark(content, label(path))
     if problem is None:
@@ -168,7 +149,7 @@ def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
     """The messages in several files of one recording, and the files. One file at a time is in memory."""
     found: list[tuple[str, Recording, Source]] = []
     first = ""
-    with _limits_as_input_errors(parts.title):
+    with limits_as_input_errors(parts.title):
         for path in parts.files:
             stored = stored_bytes(path)
             data, lost = content_of(stored, path, salvage)
@@ -206,11 +187,10 @@ def _messages(form: Form, data: FileBytes, path: str, salvage: bool, warnings: l
     An SQLite database that is not compressed is read from its file.
     """
     if form.by_path and isinstance(data, mmap):
-        database: Database = form.reader()
-        recording = database.read_recording_file(path, journals_of(path), label(path), salvage)
+        found = form.reader().read_recording_file(path, journals_of(path), label(path), salvage)
     else:
-        container: Container = form.reader()
-        recording = container.read_recording(data, label(path), salvage)
+        found = form.reader().read_recording(data, label(path), salvage)
+    recording: Recording = found
     recording.warnings[:0] = warnings
     return recording
 
@@ -230,14 +210,6 @@ def _joint_source(name: str, files: Sequence[Source]) -> Source:
     return Source(
         name, common_hash(file.sha256 for file in files), sum(file.bytes for file in files), tuple(files)
     )
-
-
-@contextmanager
-def _limits_as_input_errors(file: str) -> Iterator[None]:
-    try:
-        yield
-    except LimitExceededError as error:
-        raise InputDataError(file, str(error), error.remedy) from error
 
 
 def _check_usable(log: LaserLog, even_unusable: bool) -> None:

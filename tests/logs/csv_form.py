@@ -24,7 +24,7 @@ def recognises(data: bytes) -> bool:
 
 def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     options.refuse_topics(file, "a CSV log", "--mount")
-    findings = ReaderFindings(Skips(file, options.strict))
+    findings = ReaderFindings(Skips(file, options.strict), options)
     rows, stamps = [], []
     for number, line in enumerate(data.splitlines()[1:], start=2):
         fields = line.decode("ascii", "replace").split(",")
@@ -44,4 +44,4 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     findings.used |= {"laser": "the only laser", "mounting": "the robot's centre", "odometry": "the columns"}
     raw = RawScans(ranges, *half_turn, stamps, (0.0, 80.0))
     motion = RecordedMotion(odometry)
-    return laser_log(source, "CSV", "the laser", raw, times, mount, motion, findings, options)
+    return laser_log(source, "CSV", "the laser", raw, times, mount, motion, findings)

@@ -43,7 +43,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         raise WrongUsageError(f"{file}: has topics, no lasers by tag; leave out --laser, see --topic")
     topic, why = scan_topic(recording, options, file)
     skips = Skips(file, options.strict, place="message")
-    findings = ReaderFindings(skips, recording.topic_counts(), recording.warnings)
+    findings = ReaderFindings(skips, options, recording.topic_counts(), recording.warnings)
     findings.used = {"laser": why, "checksums": recording.checksums}
     findings.lasers, findings.laser_option = tuple(devices(recording, SCAN_TYPES)), "--topic"
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
@@ -64,14 +64,14 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     findings.warnings += times.warnings
     tree = TransformTree(recording, skips)
     clock = ScanClock(times, use_stamps, _recording_delay(stamps, log_times))
-    motion = robot_odometry(tree, clock, options, findings)
-    mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings)
+    motion = robot_odometry(tree, clock, findings)
+    mount, hanging, robot = laser_mounting(scans, motion.robot, tree, findings)
     findings.frames = distinct_frame_names(scans[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
         # Seen from above, the beams of a laser that is upside down run clockwise.
         raw = raw.mirrored()
     recorded = RecordedMotion(motion.poses, path=motion.path)
-    return laser_log(source, recording.form, topic, raw, times, mount, recorded, findings, options)
+    return laser_log(source, recording.form, topic, raw, times, mount, recorded, findings)
 
 
 def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:

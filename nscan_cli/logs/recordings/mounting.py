@@ -9,7 +9,6 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.assemble import ReaderFindings
-from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
 from nscan_cli.logs.recordings.moving_mount import MountingOptions, MovingMount, moving_mount
@@ -28,11 +27,7 @@ class MountingError(InputDataError):
 
 
 def laser_mounting(
-    scans: Sequence[ScanMessage],
-    robot: str,
-    tree: TransformTree,
-    options: ReadingOptions,
-    findings: ReaderFindings,
+    scans: Sequence[ScanMessage], robot: str, tree: TransformTree, findings: ReaderFindings
 ) -> tuple[Array, bool, str]:
     """The laser's pose on the robot (3,), whether it is upside down, and the robot's frame if it is known.
 
@@ -40,9 +35,9 @@ def laser_mounting(
     give the pose, or their mean when they rock as those of a stabiliser. Raises MountingError when the
     laser is tilted, or moves otherwise.
     """
-    if options.mount is not None:
+    if findings.options.mount is not None:
         findings.used["mounting"] = "--mount"
-        return np.array(options.mount, dtype=np.float64), False, robot
+        return np.array(findings.options.mount, dtype=np.float64), False, robot
     file = tree.skips.file
     links, frames, how = _laser_chain(tree, robot, scans[0].frame)
     if frames is None:

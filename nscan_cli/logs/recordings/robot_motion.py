@@ -10,7 +10,6 @@ import numpy as np
 from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.device_choice import Device, OpenChoiceError
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
-from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, ODOM_FRAMES, without_prefix
 from nscan_cli.logs.recordings.message_stamps import are_in_seconds
@@ -52,13 +51,12 @@ class RobotMotion(NamedTuple):
     """The parent frame of the odometry; empty where nothing names it."""
 
 
-def robot_odometry(
-    tree: TransformTree, clock: ScanClock, options: ReadingOptions, findings: ReaderFindings
-) -> RobotMotion:
+def robot_odometry(tree: TransformTree, clock: ScanClock, findings: ReaderFindings) -> RobotMotion:
     """The robot's motion from the topic that --odom-topic names, from the only one, or from tf.
 
     Raises WrongUsageError and OpenChoiceError when topics have to be chosen.
     """
+    options = findings.options
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return RobotMotion(None, None, _robot_frame(tree), "")
@@ -75,7 +73,7 @@ def robot_odometry(
         rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if asked is None else f"{asked} is asked for"
-    poses, path = _poses_at_scans(rows, source or "tf", clock, options, findings)
+    poses, path = _poses_at_scans(rows, source or "tf", clock, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     elif rows:
@@ -126,19 +124,15 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform],
-    source: str,
-    clock: ScanClock,
-    options: ReadingOptions,
-    findings: ReaderFindings,
+    rows: Sequence[LoggedTransform], source: str, clock: ScanClock, findings: ReaderFindings
 ) -> tuple[Array | None, RobotPath | None]:
     """Interpolated poses (S, 3) at the times of the scans, and the path; None without a valid pose.
 
     The clock offset of the options is added to the times of the poses.
     """
-    found, found_at, delays, offset = [], [], [], options.clock_offset
+    found, found_at, delays, offset = [], [], [], findings.options.clock_offset
     as_written = [transform.pose for transform, _ in rows]
-    if options.as_recorded:
+    if findings.options.as_recorded:
         angles = [heading(pose) for pose in as_written]
     else:
         angles, mended = headings_of(as_written)

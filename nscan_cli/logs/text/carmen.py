@@ -59,7 +59,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     """
     skips = Skips(file, options.strict)
     lines = carmen_records.lines_by_tag(data, skips)
-    findings = ReaderFindings(skips, {name: len(found) for name, found in lines.items()})
+    findings = ReaderFindings(skips, options, {name: len(found) for name, found in lines.items()})
     warnings, used = findings.warnings, findings.used
     options.refuse_topics(file, "a CARMEN log", "--laser")
     findings.lasers = tuple(Device(tag, tag, len(lines[tag])) for tag in LASERS if tag in lines)
@@ -85,7 +85,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         warnings.append(f"the poses are a mapper's result, not odometry ({sign})")
     params = _params(lines)
     times, by_logger = _scan_order(lines[tag], scans, warnings)
-    headings_in_radians([scans.robot, scans.laser], times.rows, options, findings)
+    headings_in_radians([scans.robot, scans.laser], times.rows, findings)
     mount, used["mounting"] = _carmen_mount(tag, scans, params, options, warnings)
     angle_min, angle_increment, angle_max = _angles(scans, used)
     farthest, doubtful = _max_range(tag, scans, params)
@@ -101,9 +101,9 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         scans.beams,
         angles_assumed=not scans.head[:, 3:4].any(),
     )
-    odometry = _odometry(tag, scans, times, by_logger, lines, options, findings)
+    odometry = _odometry(tag, scans, times, by_logger, lines, findings)
     motion = RecordedMotion(odometry, *_true_poses(lines, by_logger, skips, warnings))
-    return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options)
+    return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings)
 
 
 def _scan_order(
@@ -257,24 +257,23 @@ def _odometry(
     times: order.ScanOrder,
     by_logger: bool,
     lines: TaggedLines,
-    options: ReadingOptions,
     findings: ReaderFindings,
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: the scans' own, else those of the ODOM records."""
-    if not options.odometry:
+    if not findings.options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return None
     if not scans.robot.shape[1]:
         values, stamps = carmen_records.carmen_poses(lines.get("ODOM", []), findings.skips, by_logger)
         recorded = order.by_time(stamps)
-        headings_in_radians([values], recorded.rows, options, findings)
+        headings_in_radians([values], recorded.rows, findings)
         name, origin = "ODOM record", "ODOM records, interpolated"
-        return odometry_of_records(times, recorded, values[recorded.rows], name, origin, options, findings)
+        return odometry_of_records(times, recorded, values[recorded.rows], name, origin, findings)
     if len(times.rows) > 1 and not scans.robot.any():
         findings.used["odometry"] = "none: all poses are zero"
         findings.warnings.append("all poses are zero: the log is read as one without odometry")
         return None
-    return odometry_of_scans(times, scans.robot, f"the poses in {tag}", options, findings)
+    return odometry_of_scans(times, scans.robot, f"the poses in {tag}", findings)
 
 
 def _true_poses(

@@ -62,9 +62,8 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     assert version is not None
     skips = Skips(file, options.strict)
     lines = player_records.lines_by_device(data, version, skips)
-    findings = ReaderFindings(
-        skips, {f"{device} {kind}".strip(): len(found) for (device, kind), found in lines.items()}
-    )
+    records = {f"{device} {kind}".strip(): len(found) for (device, kind), found in lines.items()}
+    findings = ReaderFindings(skips, options, records)
     lasers = _devices(LASER_INTERFACES, lines)
     findings.lasers, findings.odometries = tuple(lasers), tuple(_devices(ODOMETRY_INTERFACES, lines))
     laser, findings.used["laser"] = choose_device("laser", options.laser, lasers, file)
@@ -80,10 +79,10 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         findings.warnings.append(BEGINS_AT_ZERO)
     times = order.by_time(scans.raw.stamps)
     findings.warnings += times.warnings
-    mount = _player_mount(laser, lines, options, findings)
-    motion = RecordedMotion(_odometry(scans, lines, times, options, findings))
+    mount = _player_mount(laser, lines, findings)
+    motion = RecordedMotion(_odometry(scans, lines, times, findings))
     form = VERSION_NAMES[version]
-    return laser_log(source, form, laser, scans.raw, times, mount, motion, findings, options)
+    return laser_log(source, form, laser, scans.raw, times, mount, motion, findings)
 
 
 def _begin_at_zero(scans: PlayerScans) -> bool:
@@ -110,11 +109,11 @@ def _devices(interfaces: tuple[str, ...], lines: DeviceLines) -> list[Device]:
     return [Device(device, device.split(":")[-2], count) for device, count in counts.items()]
 
 
-def _player_mount(laser: str, lines: DeviceLines, options: ReadingOptions, findings: ReaderFindings) -> Array:
+def _player_mount(laser: str, lines: DeviceLines, findings: ReaderFindings) -> Array:
     """Pose (3,) of the laser on the robot: --mount, else the log's geometry record (4:1), else zero."""
-    if options.mount is not None:
+    if findings.options.mount is not None:
         findings.used["mounting"] = "--mount"
-        return np.array(options.mount, dtype=np.float64)
+        return np.array(findings.options.mount, dtype=np.float64)
     rows, _ = player_records.poses_with_size(lines.get((laser, "4:1"), []), 5, findings.skips)
     if len(rows):
         mount: Array = rows[-1]
@@ -127,19 +126,16 @@ def _player_mount(laser: str, lines: DeviceLines, options: ReadingOptions, findi
 
 
 def _odometry(
-    scans: PlayerScans,
-    lines: DeviceLines,
-    times: order.ScanOrder,
-    options: ReadingOptions,
-    findings: ReaderFindings,
+    scans: PlayerScans, lines: DeviceLines, times: order.ScanOrder, findings: ReaderFindings
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: those in the scans, else those of a position device."""
+    options = findings.options
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return None
     if scans.robot is not None and scans.robot.any() and options.odom_topic is None:
-        headings_in_radians([scans.robot], times.rows, options, findings)
-        return odometry_of_scans(times, scans.robot, "the poses in the scans (1:2)", options, findings)
+        headings_in_radians([scans.robot], times.rows, findings)
+        return odometry_of_scans(times, scans.robot, "the poses in the scans (1:2)", findings)
     device, why = choose_device("odometry", options.odom_topic, findings.odometries, findings.skips.file)
     found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
     values, stamps = player_records.device_poses(found, findings.skips)
@@ -148,6 +144,6 @@ def _odometry(
     if scans.bearings == "degrees" and are_in_degrees(poses, TextLogOptions().beside_degrees):
         poses[:, 2] = np.radians(poses[:, 2])
         origin += ", headings in degrees"
-    headings_in_radians([poses], np.arange(len(poses)), options, findings)
+    headings_in_radians([poses], np.arange(len(poses)), findings)
     name = f"record of {device or 'a position device'}"
-    return odometry_of_records(times, recorded, poses, name, origin, options, findings)
+    return odometry_of_records(times, recorded, poses, name, origin, findings)

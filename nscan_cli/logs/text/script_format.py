@@ -50,7 +50,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     options.refuse_topics(file, "a .script log", "--laser")
     skips = Skips(file, options.strict)
     records = _records_by_tag(data, skips)
-    findings = ReaderFindings(skips, {tag: len(found) for tag, found in records.items()})
+    findings = ReaderFindings(skips, options, {tag: len(found) for tag, found in records.items()})
     findings.lasers = tuple(
         Device(tag, LASER_RANGE, len(found))
         for tag, found in records.items()
@@ -66,8 +66,8 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     findings.warnings += times.warnings
     mount = np.array(options.mount or (0.0, 0.0, 0.0), dtype=np.float64)
     findings.used["mounting"] = "--mount" if options.mount else "assumed: at the robot's centre"
-    motion = RecordedMotion(_odometry(records, times, options, findings))
-    return laser_log(source, ".script", laser, raw, times, mount, motion, findings, options)
+    motion = RecordedMotion(_odometry(records, times, findings))
+    return laser_log(source, ".script", laser, raw, times, mount, motion, findings)
 
 
 def _records_by_tag(data: bytes, skips: Skips) -> ScriptRecords:
@@ -125,17 +125,14 @@ def _script_scans(laser_records: list[tuple[LineRecord, bytes]], skips: Skips) -
     )
 
 
-def _odometry(
-    records: ScriptRecords, times: order.ScanOrder, options: ReadingOptions, findings: ReaderFindings
-) -> Array | None:
+def _odometry(records: ScriptRecords, times: order.ScanOrder, findings: ReaderFindings) -> Array | None:
     """Poses of the robot (S, 3) in order of time, those of the POS records, or None."""
-    if not options.odometry:
+    if not findings.options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return None
     values, stamps = parsed_poses([record for record, _ in records.get("POS", [])], (3, 5), findings.skips)
     recorded = order.by_time(stamps)
     poses = values[recorded.rows] * (METRES_PER_CM, METRES_PER_CM, 1.0)
     poses[:, 2] = wrap(np.radians(poses[:, 2]))
-    return odometry_of_records(
-        times, recorded, poses, "POS record", "POS records, interpolated", options, findings
-    )
+    origin = "POS records, interpolated"
+    return odometry_of_records(times, recorded, poses, "POS record", origin, findings)
