@@ -31,13 +31,9 @@ UNIT_FACTORS = {1000.0: "millimetres", 100.0: "centimetres", 1 / 0.3048: "feet",
 OTHER_POINT = "the reference is of another point of the robot"
 
 
-def remarks(
-    result: Trajectory,
-    reference: Trajectory,
-    errors: TrajectoryErrors,
-    options: RemarkOptions = EvaluationOptions.remarks,
-) -> Iterator[str]:
+def remarks(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors) -> Iterator[str]:
     """Sentences on what differs between a result and a reference; none where nothing does."""
+    options = EvaluationOptions.remarks
     both = (("result", result), ("reference", reference))
     mixed = [(name, said) for name, trajectory in both if (said := _two_runs(trajectory, options))]
     for name, said in mixed:

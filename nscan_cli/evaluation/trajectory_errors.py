@@ -43,11 +43,7 @@ class TrajectoryErrors:
 
 
 def trajectory_errors(
-    result: Trajectory,
-    reference: Trajectory,
-    name: str = "result",
-    reference_name: str = "the reference",
-    options: EvaluationOptions = EvaluationOptions(),
+    result: Trajectory, reference: Trajectory, name: str = "result", reference_name: str = "the reference"
 ) -> TrajectoryErrors:
     """ATE after the best rigid alignment (alignment.py), and RPE, of the poses that match in time.
 
@@ -55,6 +51,7 @@ def trajectory_errors(
     from every matched pose to the first one at least `relative_distance` of path later. Messages use the
     names. Raises InputDataError when fewer than two poses match.
     """
+    options = EvaluationOptions()
     rows, partners = mutual_nearest(result.times, reference.times, options.tolerance)
     if len(rows) == 0:
         lag = lag_without_overlap(result, reference, options.remarks)

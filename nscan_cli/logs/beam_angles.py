@@ -49,13 +49,9 @@ class BeamDirections(NamedTuple):
     """(S,) angle from beam to beam, rad"""
 
 
-def beam_directions(
-    raw: RawScans,
-    options: ReadingOptions,
-    warnings: list[str],
-    checks: BeamAngleOptions = BeamAngleOptions(),
-) -> BeamDirections:
+def beam_directions(raw: RawScans, options: ReadingOptions, warnings: list[str]) -> BeamDirections:
     """The directions of the beams from the options, else from the log."""
+    checks = BeamAngleOptions()
     size = len(raw.stamps)
     first, step = raw.angle_min, raw.angle_increment
     if options.angle_increment is not None:

@@ -27,13 +27,10 @@ from nscan_cli.logs.wall_angles import (
 
 
 def checked_by_walls(
-    raw: RawScans,
-    directions: BeamDirections,
-    limits: RangeLimits,
-    options: ReadingOptions,
-    spacing: BeamSpacingOptions = BeamSpacingOptions(),
+    raw: RawScans, directions: BeamDirections, limits: RangeLimits, options: ReadingOptions
 ) -> tuple[BeamDirections, list[str]]:
     """The directions, put right if walls tell a usual laser; and messages if walls contradict them."""
+    spacing = BeamSpacingOptions()
     if options.as_recorded or options.angle_increment is not None:
         return directions, []
     beams = beam_counts(raw.ranges, raw.beams)

@@ -19,15 +19,13 @@ class BlindScanOptions:
     """Least number of such scans in a row that are named. A larger value names less."""
 
 
-def blind_scans(
-    ranges: NDArray[np.float32], numbers: Indices, options: BlindScanOptions = BlindScanOptions()
-) -> list[str]:
+def blind_scans(ranges: NDArray[np.float32], numbers: Indices) -> list[str]:
     """The messages on scans with ranges (S, B) and numbers (S,) that see nothing for long.
 
     In an open field it is no fault, but nothing is mapped there, either.
     """
     is_blind = np.logical_not(np.isfinite(ranges).any(axis=1))
-    runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]
+    runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= BlindScanOptions.min_scans]
     if not runs:
         return []
     names = stretch_names((int(numbers[first]), int(numbers[end - 1])) for first, end in runs)

@@ -49,17 +49,13 @@ class DirectionChangeOptions:
     gives more messages."""
 
 
-def corrected_directions(
-    table: ScanTable,
-    counts: Indices,
-    sign: int,
-    options: DirectionChangeOptions = DirectionChangeOptions(),
-) -> tuple[BeamDirections, list[str]]:
+def corrected_directions(table: ScanTable, counts: Indices, sign: int) -> tuple[BeamDirections, list[str]]:
     """The directions of the scans of a log, in file order, put right where scans show no change.
 
     Of several directions that are the same, those of most scans are used. Also returns messages. `counts`
     (S,) are the numbers of beams, in file order; `sign` is −1 if options count angles the other way round.
     """
+    options = DirectionChangeOptions()
     found = BeamDirections(table.angle_min.copy(), table.angle_increment.copy())
     first, step, beams = found.first[table.rows], found.step[table.rows], counts[table.rows]
     ends = np.stack([first, first + step * (beams - 1)])

@@ -87,14 +87,10 @@ class FloorLine(NamedTuple):
         )
 
 
-def floor_line(
-    table: ScanTable,
-    sectors: Sequence[Bearings],
-    options: FloorLineOptions = FloorLineOptions(),
-    parts: RobotPartsOptions = RobotPartsOptions(),
-) -> FloorLine | None:
+def floor_line(table: ScanTable, sectors: Sequence[Bearings]) -> FloorLine | None:
     """The line of the floor in the scans of a log, outside some sectors; None if they show none, or the robot
     never turns."""
+    options, parts = FloorLineOptions(), RobotPartsOptions()
     step = abs(float(table.angle_increment[table.rows[0]]))
     every = int(np.clip(np.round(options.step / max(step, 1e-12)), 1, max(table.ranges.shape[1], 1)))
     spacing = every * step
@@ -106,7 +102,7 @@ def floor_line(
         return None
     # Walls show the turns, and the floor none.
     without = table.ranges.copy()
-    without_floor(without, table.angle_min, table.angle_increment, line, options)
+    without_floor(without, table.angle_min, table.angle_increment, line)
     rest = table._replace(ranges=without)
     nothing: Mask = np.zeros(len(bearings), dtype=np.bool_)
     turning = turning_scans(rest, bearings, nothing, parts)
@@ -162,11 +158,7 @@ def _ends_views(
 
 
 def without_floor(
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    line: FloorLine,
-    options: FloorLineOptions = FloorLineOptions(),
+    ranges: NDArray[np.float32], angle_min: Array, angle_increment: Array, line: FloorLine
 ) -> int:
     """Write nan for the readings of scans (S, B) on a line or beyond, in place; returns how many those were.
 
@@ -175,7 +167,7 @@ def without_floor(
     bearings = angle_min[:, None] + angle_increment[:, None] * np.arange(ranges.shape[1])
     # What returns nothing may be as far away as it likes.
     known = np.isfinite(ranges)
-    is_floor = line.depths(np.where(known, ranges, 0.0), bearings) >= 1.0 - options.margin
+    is_floor = line.depths(np.where(known, ranges, 0.0), bearings) >= 1.0 - FloorLineOptions.margin
     count = int(np.count_nonzero(is_floor))
     ranges[is_floor] = np.nan
     return count

@@ -40,16 +40,12 @@ class RangeLimits(NamedTuple):
         return float(self.low.min()), float(self.high.max())
 
 
-def limits_in_force(
-    raw: RawScans,
-    options: ReadingOptions,
-    warnings: list[str],
-    checks: RangeLimitOptions = RangeLimitOptions(),
-) -> RangeLimits:
+def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str]) -> RangeLimits:
     """The limits from the options, else from the log, and at most the value that means "no return".
 
     That value is searched among all readings, and at the limits, which drivers write for readings beyond.
     """
+    checks = RangeLimitOptions()
     scans = len(raw.stamps)
     low, high = (np.array(np.broadcast_to(limit, scans), dtype=np.float64) for limit in raw.limits)
     low_from, high_from = raw.limits_from

@@ -90,14 +90,13 @@ class WrongUnit(NamedTuple):
         )
 
 
-def wrong_unit(
-    ranges: NDArray[np.float32], limits: RangeLimits, options: RangeUnitOptions = RangeUnitOptions()
-) -> WrongUnit | None:
+def wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> WrongUnit | None:
     """The unit of readings (S, B) as written; None for metres, or if no unit fits.
 
     The unit is wrong if the median return is beyond the limits, or implausibly large or small, and three
     quarters of the returns would be within the limits in another unit.
     """
+    options = RangeUnitOptions()
     some = ranges.reshape(-1)[:: -(-ranges.size // options.sample)]
     some = some[(some > 0) & np.isfinite(some)]
     if limits.no_return is not None and not _continue_beyond(some, limits.no_return):

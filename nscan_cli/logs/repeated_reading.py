@@ -45,12 +45,9 @@ class RepeatedReadingOptions:
     """Beams that have it in a larger share of the scans do not count: they are dead, or see the robot."""
 
 
-def repeated_readings(
-    ranges: NDArray[np.float32],
-    limits: RangeLimits,
-    options: RepeatedReadingOptions = RepeatedReadingOptions(),
-) -> dict[float, float]:
+def repeated_readings(ranges: NDArray[np.float32], limits: RangeLimits) -> dict[float, float]:
     """The readings (m) among ranges (S, B) that are no distances, with their shares of the usable ones."""
+    options = RepeatedReadingOptions()
     if not len(ranges):
         return {}
     rows = np.unique(np.linspace(0, len(ranges) - 1, options.scans).astype(np.int64))
@@ -101,15 +98,13 @@ def _is_all_over(has_reading: NDArray[np.bool_], options: RepeatedReadingOptions
 
 
 def without_repeated_readings(
-    ranges: NDArray[np.float32],
-    limits: RangeLimits,
-    options: RepeatedReadingOptions = RepeatedReadingOptions(),
+    ranges: NDArray[np.float32], limits: RangeLimits
 ) -> tuple[NDArray[np.int64], list[str]]:
     """Write nan for usable readings among ranges (S, B) that are no distances, in place.
 
     Returns the number of such readings of each scan (S,), and the messages for the user.
     """
-    found = repeated_readings(ranges, limits, options)
+    found = repeated_readings(ranges, limits)
     if not found:
         return np.zeros(len(ranges), dtype=np.int64), []
     is_repeated = np.isin(ranges, np.array(list(found), dtype=np.float32)) & _are_usable(ranges, limits)

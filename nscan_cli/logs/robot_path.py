@@ -50,13 +50,12 @@ class RobotPath(NamedTuple):
     """(P, 2) cosine and sine of each heading."""
 
 
-def robot_path(
-    times: Array, poses: Array, options: RobotPathOptions = RobotPathOptions()
-) -> RobotPath | None:
+def robot_path(times: Array, poses: Array) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s, that do not decrease; None with fewer than two.
 
     Unknown poses are left out, and all but the first of those at one time.
     """
+    options = RobotPathOptions()
     known = np.flatnonzero(are_known(poses))
     used = known[np.diff(times[known], prepend=-np.inf) > 0.0]
     if len(used) < 2:
@@ -105,14 +104,13 @@ def bent_between(
     return bent
 
 
-def likelier_path(
-    path: RobotPath, times: Array, poses: Array, options: RobotPathOptions = RobotPathOptions()
-) -> RobotPath | None:
+def likelier_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s: bent, with the motion of `path` between two of them, or
     steady there if that tells better where every second pose is from those beside it.
 
     Odometry whose clock or wheels are off leads astray between two poses.
     """
+    options = RobotPathOptions()
     steady, bent = robot_path(times, poses), bent_path(path, times, poses)
     if len(times) < options.least_poses or steady is None or bent is None:
         return bent

@@ -27,10 +27,9 @@ class RoundedRangeOptions:
     """Approximate number of ranges that are looked at. More take longer."""
 
 
-def rounding_of_ranges(
-    ranges: NDArray[np.float32], options: RoundedRangeOptions = RoundedRangeOptions()
-) -> str:
+def rounding_of_ranges(ranges: NDArray[np.float32]) -> str:
     """The message if ranges (S, B), m, are multiples of a step; else empty. nan and inf do not count."""
+    options = RoundedRangeOptions()
     some = ranges[:: max(ranges.size // options.sample, 1)].astype(np.float64).ravel()
     some = some[np.isfinite(some)]
     if len(some) < options.min_returns:

@@ -34,16 +34,14 @@ class SlowOdometryOptions:
 
 
 def without_repeats(
-    odometry: Array,
-    times: Array,
-    scans: tuple[NDArray[np.float32], NDArray[np.int64]] | None = None,
-    options: SlowOdometryOptions = SlowOdometryOptions(),
+    odometry: Array, times: Array, scans: tuple[NDArray[np.float32], NDArray[np.int64]] | None = None
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, steady between two poses that differ if it is slow; and what to say.
 
     scans: readings (S, B), m, and the rows (S,) of them at these times; None if the times are those of
     odometry. The text is empty where nothing is changed. Unknown poses are nan and stay so.
     """
+    options = SlowOdometryOptions()
     stands = (odometry[1:] == odometry[:-1]).all(axis=1)
     moves = ~stands & are_known(odometry[1:]) & are_known(odometry[:-1])
     ends = np.flatnonzero(moves[1:] & stands[:-1]) + 1

@@ -59,12 +59,7 @@ class Sweep:
 
 
 def sweep_of_file(
-    told: RecordedSweep | None,
-    increments: Array,
-    beams: Indices,
-    times: Array,
-    as_recorded: bool = False,
-    options: SweepOptions = SweepOptions(),
+    told: RecordedSweep | None, increments: Array, beams: Indices, times: Array, as_recorded: bool = False
 ) -> Sweep:
     """The likeliest times of the sweeps, from what S scans say of them.
 
@@ -74,6 +69,7 @@ def sweep_of_file(
     time between scans, unless `as_recorded`. A file without times of beams may be of a laser that sees at
     once.
     """
+    options = SweepOptions()
     none = np.zeros(len(times))
     if told is None:
         return Sweep(none, "")

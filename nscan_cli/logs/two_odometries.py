@@ -39,15 +39,14 @@ class TwoOdometriesOptions:
     """Largest share of poses that belong to neither. A larger value takes noise for a second source."""
 
 
-def of_one_source(
-    odometry: Array, times: Array, options: TwoOdometriesOptions = TwoOdometriesOptions()
-) -> tuple[Array, str]:
+def of_one_source(odometry: Array, times: Array) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, of the source with the most poses, steady between these; and what to
     say.
 
     Unknown poses are nan and stay so. The text is empty where nothing is changed. A source that stands is
     none.
     """
+    options = TwoOdometriesOptions()
     known = np.flatnonzero(are_known(odometry))
     recorded = odometry[known]
     # A pose that is repeated tells nothing new, and next to no step all others seem long.

@@ -28,11 +28,7 @@ class UnusableReadings(NamedTuple):
 
 
 def unusable_readings(
-    ranges: NDArray[np.float32],
-    beams: NDArray[np.int64],
-    limits: RangeLimits,
-    file: str,
-    checks: RangeLimitOptions = RangeLimitOptions(),
+    ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: RangeLimits, file: str
 ) -> UnusableReadings:
     """The number of unusable readings among those (S, B; m) as written, of which scans have `beams` (S,)."""
     wrong = limits.low >= limits.high
@@ -51,7 +47,7 @@ def unusable_readings(
     total, lost = int(beams.sum()), sum(counts.values())
     found_unit = wrong_unit(ranges, limits)
     unit, remedy = ("", "") if found_unit is None else (f"; {found_unit.seems}", found_unit.remedy)
-    if lost <= checks.max_lost_share * total and not unit:
+    if lost <= RangeLimitOptions.max_lost_share * total and not unit:
         told = f"{counts.get(crossed, 0):,} of {_readings(total)} are unusable: {crossed}"
         return UnusableReadings(counts, [told] if crossed in counts else [], None)
     listed = ", ".join(f"{n:,} {'is' if n == 1 else 'are'} {why}" for why, n in counts.items()) + unit
@@ -60,7 +56,7 @@ def unusable_readings(
     if not remedy and most in options_by_reason and not met_nothing:
         remedy = f"if they are valid, set {options_by_reason[most]}"
     if lost < total:
-        few = "only " if lost > checks.max_lost_share * total else ""
+        few = "only " if lost > RangeLimitOptions.max_lost_share * total else ""
         said = f"{few}{total - lost:,} of {_readings(total)} are usable" + (f": {listed}" if counts else unit)
         return UnusableReadings(counts, [f"{said}; {remedy}" if remedy else said], None)
     options = [option for option in ("--min-range", "--max-range") if f"({option})" in most]

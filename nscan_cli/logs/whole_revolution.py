@@ -57,14 +57,10 @@ class WholeRevolutionOptions:
 
 
 def in_whole_revolutions(
-    raw: RawScans,
-    directions: BeamDirections,
-    limits: RangeLimits,
-    options: ReadingOptions,
-    checks: WholeRevolutionOptions = WholeRevolutionOptions(),
-    spacing: BeamSpacingOptions = BeamSpacingOptions(),
+    raw: RawScans, directions: BeamDirections, limits: RangeLimits, options: ReadingOptions
 ) -> tuple[BeamDirections, list[str]]:
     """The directions of beams over one revolution if walls show that they cover one; and the messages."""
+    checks, spacing = WholeRevolutionOptions(), BeamSpacingOptions()
     beams = beam_counts(raw.ranges, raw.beams)
     count, step = int(beams[0]), float(np.median(directions.step))
     off = count * abs(step) - 2 * math.pi

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.logs.direction_changes import DirectionChangeOptions, corrected_directions
+from nscan_cli.logs.direction_changes import corrected_directions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -31,7 +31,7 @@ CHANGES: dict[str, tuple[Callable[[LaserLog], LaserLog], str]] = {
 
 def checked(log: LaserLog) -> tuple[LaserLog, list[str]]:
     """The log with the directions that are used, and what is said."""
-    directions, said = corrected_directions(table_of(log), log.beam_counts(), 1, DirectionChangeOptions())
+    directions, said = corrected_directions(table_of(log), log.beam_counts(), 1)
     return replace(log, angle_min=directions.first, angle_increment=directions.step), said
 
 

@@ -11,7 +11,6 @@ from nscan_cli.logs.floor_line import FloorLine, FloorLineOptions, floor_line
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_parts import RobotPartsOptions
 from tests.data import data_file
 from tests.logs.test_robot_parts import as_carmen, narrow, office_log, table_of
 from tests.simulation import faults
@@ -22,7 +21,7 @@ MARGIN = FloorLineOptions().margin
 
 
 def found(log: LaserLog) -> FloorLine | None:
-    return floor_line(table_of(log), [], FloorLineOptions(), RobotPartsOptions())
+    return floor_line(table_of(log), [])
 
 
 @pytest.mark.parametrize("degrees", [0.0, 20.0, -90.0])
