@@ -113,7 +113,7 @@ def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float 
     def told(half_width: float) -> float | None:
         return _told_factor(scans, half_width, options)
 
-    factor = _settled(told, options.half_width, options)
+    factor = _settled(told, options.half_width)
     narrow = None if factor is None else told(options.narrow_half_width / factor)
     if factor is None or narrow is None or abs(math.log(narrow / factor)) > options.agreement:
         return None
@@ -127,7 +127,7 @@ def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float 
     """
 
     def told(some: SampledScans, half_width: float, min_beams: int) -> float | None:
-        return _settled(lambda width: _most_told(some, width, min_beams, options), half_width, options)
+        return _settled(lambda width: _most_told(some, width, min_beams, options), half_width)
 
     factor = told(scans, options.widest_half_width, options.min_beams)
     if factor is None or abs(math.log(factor)) < options.min_small_difference:
@@ -145,20 +145,18 @@ def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float 
     return factor if 2 * agreeing > options.parts else None
 
 
-def _settled(
-    told: Callable[[float], float | None], half_width: float, options: BeamSpacingOptions
-) -> float | None:
+def _settled(told: Callable[[float], float | None], half_width: float) -> float | None:
     """The factor that is `told` once the angle (rad) to the beams compared is right by that factor itself.
 
     None if none is told, or if it does not settle.
     """
     factor = 1.0
-    for _ in range(options.max_rounds):
+    for _ in range(BeamSpacingOptions.max_rounds):
         found = told(half_width / factor)
         if found is None:
             return None
         change, factor = abs(math.log(found / factor)), found
-        if change < options.settled:
+        if change < BeamSpacingOptions.settled:
             return factor
     return None
 

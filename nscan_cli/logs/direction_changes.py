@@ -68,7 +68,7 @@ def corrected_directions(table: ScanTable, counts: Indices, sign: int) -> tuple[
     parts = list(itertools.pairwise([0, *places, len(first)]))
     groups, doubts = [[parts[0]]], list[int]()
     for part in parts[1:]:
-        gain = _gain_of_numbers(table, part[0], options)
+        gain = _gain_of_numbers(table, part[0])
         if gain >= options.min_gain:
             groups[-1].append(part)
         else:
@@ -110,13 +110,14 @@ def _named(first: float, step: float) -> str:
     return f"{math.degrees(first):.4g}° in steps of {math.degrees(step):.4g}°"
 
 
-def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptions) -> float:
+def _gain_of_numbers(table: ScanTable, place: int) -> float:
     """Whether scans go on by number or by direction from a place on: the difference of two shares of beams.
 
     The first share is of beams that see what the beam of the same number saw in the scan before. The second
     is of those that see what the beam in the same direction saw. Of the differences in three pairs of scans
     the smallest is returned if it is above 0, else the largest.
     """
+    options = DirectionChangeOptions()
     last, gains = len(table.rows) - 1, []
     for one, other in ((place - 1, place), (max(place - 2, 0), place), (place - 1, min(place + 1, last))):
         by_number, by_file = table.bearings(table.rows[one]), table.bearings(table.rows[other])
@@ -126,21 +127,16 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
         most = min(options.max_turn, options.max_turn_share * change)
         turns = np.arange(-most, most + 1e-9, options.turn_step).tolist()
         shares = [
-            max(
-                _same_share(ranges_at(table, np.array([one]), each + turn)[0], seen, options)
-                for turn in turns
-            )
+            max(_same_share(ranges_at(table, np.array([one]), each + turn)[0], seen) for turn in turns)
             for each in (by_number, by_file)
         ]
         gains.append(shares[0] - shares[1])
     return min(gains) if min(gains) > 0.0 else max(gains)
 
 
-def _same_share(
-    one: NDArray[np.float32], other: NDArray[np.float32], options: DirectionChangeOptions
-) -> float:
+def _same_share(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
     """The share of beams (B,) of two scans with nearly the same range; 0 for few."""
     known = np.isfinite(one) & np.isfinite(other)
     count = int(np.count_nonzero(known))
-    near = np.abs(one[known] - other[known]) <= options.same_range * other[known]
-    return np.count_nonzero(near) / count if count >= options.min_beams else 0.0
+    near = np.abs(one[known] - other[known]) <= DirectionChangeOptions.same_range * other[known]
+    return np.count_nonzero(near) / count if count >= DirectionChangeOptions.min_beams else 0.0

@@ -97,8 +97,8 @@ def floor_line(table: ScanTable, sectors: Sequence[Bearings]) -> FloorLine | Non
     bearings = np.sort(table.bearings(table.rows[0])[::every])
     bearings = bearings[~in_sectors(bearings, sectors)]
     ranges = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
-    line = _fitted(ranges, bearings, spacing, options)
-    if line is None or not _ends_views(line, ranges, bearings, spacing, options):
+    line = _fitted(ranges, bearings, spacing)
+    if line is None or not _ends_views(line, ranges, bearings, spacing):
         return None
     # Walls show the turns, and the floor none.
     without = table.ranges.copy()
@@ -109,14 +109,13 @@ def floor_line(table: ScanTable, sectors: Sequence[Bearings]) -> FloorLine | Non
     if not len(turning):
         return None
     seen = ranges_at(table, turning, bearings)
-    return line if _ends_views(line, seen, bearings, spacing, options) else None
+    return line if _ends_views(line, seen, bearings, spacing) else None
 
 
-def _fitted(
-    ranges: NDArray[np.float32], bearings: Array, spacing: float, options: FloorLineOptions
-) -> FloorLine | None:
+def _fitted(ranges: NDArray[np.float32], bearings: Array, spacing: float) -> FloorLine | None:
     """The line through the farthest readings of bearings (B,), `spacing` (rad) apart, in which many of the
     ranges (n, B) are."""
+    options = FloorLineOptions()
     ordered = np.sort(np.where(np.isfinite(ranges), ranges, np.inf), axis=0)
     counts = np.isfinite(ordered).sum(axis=0)
     at = np.minimum((options.quantile * counts).astype(np.int64), len(ordered) - 1)
@@ -134,14 +133,9 @@ def _fitted(
     return line
 
 
-def _ends_views(
-    line: FloorLine,
-    ranges: NDArray[np.float32],
-    bearings: Array,
-    spacing: float,
-    options: FloorLineOptions,
-) -> bool:
+def _ends_views(line: FloorLine, ranges: NDArray[np.float32], bearings: Array, spacing: float) -> bool:
     """Whether many of the ranges (n, B) are on a line, over a wide enough view, and hardly any beyond it."""
+    options = FloorLineOptions()
     if line.distance > options.max_distance:
         return False
     about = np.mod(bearings - line.bearing + np.pi, 2 * np.pi) - np.pi

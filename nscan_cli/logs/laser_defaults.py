@@ -29,9 +29,7 @@ def beam_angles(beams: int) -> tuple[float, float]:
     return -math.pi / 2, known.get(beams, 180.0 / max(beams - 1, 1)) * RAD_PER_DEGREE
 
 
-def no_return_value(
-    ranges: NDArray[np.float32], options: RangeLimitOptions = RangeLimitOptions()
-) -> float | None:
+def no_return_value(ranges: NDArray[np.float32]) -> float | None:
     """The smallest reading (m) that means "no return", from all readings of a log; None if there is none.
 
     Without a return a laser writes one fixed value above all that it can measure. SICK's codes are known. Any
@@ -40,6 +38,7 @@ def no_return_value(
     `peak_ratio` times the readings of the metre below. Or it is a single value there with `peak_ratio` times
     the readings of any other in that metre. At least `distinct_readings` must be lower.
     """
+    options = RangeLimitOptions()
     usable = ranges[(ranges > 0) & (ranges < options.largest_range)]
     if usable.size == 0:
         return None
@@ -53,27 +52,28 @@ def no_return_value(
     peak, below = int(counts[top].sum()), int(counts[~top].sum())
     sharpest = int(counts[top].max())
     if peak < options.peak_readings or 2 * sharpest < peak or peak < options.peak_ratio * below:
-        return _single_value(usable, largest, options)
+        return _single_value(usable, largest)
     least = int(values[top & (counts >= options.top_share * sharpest)].min()) / 100 - 0.005
-    if not _are_many_values(usable[usable < least], options):
+    if not _are_many_values(usable[usable < least]):
         return None
     return _rounded(usable[usable >= least].min())
 
 
-def _single_value(usable: NDArray[np.float32], largest: float, options: RangeLimitOptions) -> float | None:
+def _single_value(usable: NDArray[np.float32], largest: float) -> float | None:
     """The no-return value among readings (N,) above 0 if readings of a wall may lie near it."""
+    options = RangeLimitOptions()
     values, counts = np.unique(usable[usable > largest - options.top_range], return_counts=True)
     value, count = values[counts.argmax()], counts.max()
     limit = np.array([value], dtype=np.float64)
-    stands_out = peak_at_limit(usable[None], limit, -1, options.peak_ratio, options)
+    stands_out = peak_at_limit(usable[None], limit, -1, options.peak_ratio)
     if stands_out is None or options.peak_ratio * np.count_nonzero(usable > value) > count:
         return None
-    return _rounded(value) if _are_many_values(usable[usable < value], options) else None
+    return _rounded(value) if _are_many_values(usable[usable < value]) else None
 
 
-def _are_many_values(readings: NDArray[np.float32], options: RangeLimitOptions) -> bool:
+def _are_many_values(readings: NDArray[np.float32]) -> bool:
     """Whether readings (N,) have enough distinct values; mostly the first of them tell."""
-    least = options.distinct_readings
+    least = RangeLimitOptions.distinct_readings
     return any(np.unique(some).size >= least for some in (readings[: 100 * least], readings))
 
 

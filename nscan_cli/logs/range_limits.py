@@ -45,24 +45,23 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
 
     That value is searched among all readings, and at the limits, which drivers write for readings beyond.
     """
-    checks = RangeLimitOptions()
     scans = len(raw.stamps)
     low, high = (np.array(np.broadcast_to(limit, scans), dtype=np.float64) for limit in raw.limits)
     low_from, high_from = raw.limits_from
-    no_return = no_return_value(raw.ranges, checks)
+    no_return = no_return_value(raw.ranges)
     if options.max_range is None:
-        end = checks.largest_range if no_return is None else no_return
-        high, high_from = _upper_limits(raw, high, high_from, end, warnings, checks)
-    gap = peak_at_limit(raw.ranges, low, inside=1, options=checks)
+        end = RangeLimitOptions.largest_range if no_return is None else no_return
+        high, high_from = _upper_limits(raw, high, high_from, end, warnings)
+    gap = peak_at_limit(raw.ranges, low, inside=1)
     if gap is not None:
         low, low_from = low + gap, f"{low_from}, at a peak of invalid readings"
     if options.min_range is not None:
         low, low_from = np.full(scans, options.min_range), "--min-range"
-    gap = peak_at_limit(raw.ranges, high, inside=-1, options=checks)
+    gap = peak_at_limit(raw.ranges, high, inside=-1)
     if gap is not None and options.max_range is not None:
         beyond = (raw.ranges > high[:, None]) & (raw.ranges < options.max_range)
         # If more than a few readings lie beyond, the user asks for these.
-        gap = None if np.count_nonzero(beyond) >= checks.peak_readings else gap
+        gap = None if np.count_nonzero(beyond) >= RangeLimitOptions.peak_readings else gap
     if gap is not None:
         high, high_from = high - gap, f"{high_from}, at a peak of readings without return"
         if (high == high[0]).all():
@@ -75,7 +74,7 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
 
 
 def _upper_limits(
-    raw: RawScans, high: Array, high_from: str, end: float, warnings: list[str], checks: RangeLimitOptions
+    raw: RawScans, high: Array, high_from: str, end: float, warnings: list[str]
 ) -> tuple[Array, str]:
     """The upper limits (S,) that the log names, and their origin.
 
@@ -85,7 +84,7 @@ def _upper_limits(
     for limit, source in sorted(raw.doubtful):
         if limit >= high.max():
             continue
-        share = returns_beyond(raw.ranges, limit, min(end, float(high.max())), checks)
+        share = returns_beyond(raw.ranges, limit, min(end, float(high.max())))
         if share == 0.0:
             return np.minimum(high, limit), source
         warnings.append(
@@ -93,8 +92,8 @@ def _upper_limits(
             f"of the laser and is not used; --max-range {limit:g} would use it"
         )
     if (high == high[0]).all():
-        share = returns_beyond(raw.ranges, float(high[0]), end, checks)
-        if checks.min_reported_share <= share <= checks.max_reported_share:
+        share = returns_beyond(raw.ranges, float(high[0]), end)
+        if RangeLimitOptions.min_reported_share <= share <= RangeLimitOptions.max_reported_share:
             warnings.append(
                 f"{_percent(share)} of the returns lie beyond {high[0]:g} m ({high_from}) and are read as "
                 "no return; if they are valid, give a larger --max-range"
@@ -102,12 +101,13 @@ def _upper_limits(
     return high, high_from
 
 
-def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float, checks: RangeLimitOptions) -> float:
+def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float) -> float:
     """The share of returns from `limit` to `end` (m) if returns continue beyond the limit; else 0.
 
     Beyond a laser's own limit there are no returns, one single value, or far fewer than just below it, and
     the readings may have a peak at it.
     """
+    checks = RangeLimitOptions()
     returns = ranges[(ranges > 0) & (ranges < end)]
     beyond = returns[returns > limit * (1 + ROUNDING)]
     if beyond.size < checks.peak_readings:
@@ -118,7 +118,7 @@ def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float, checks
     drops = np.count_nonzero(beyond <= far) < checks.max_drop * below
     if drops or 2 * counts.max() >= beyond.size:
         return 0.0
-    if peak_at_limit(ranges, np.full(len(ranges), limit), -1, options=checks) is not None:
+    if peak_at_limit(ranges, np.full(len(ranges), limit), -1) is not None:
         return 0.0
     return float(beyond.size / returns.size)
 

@@ -52,17 +52,15 @@ def peak_at_limit(
     ranges: NDArray[np.float32],
     limits: Array,
     inside: int,
-    ratio_to_largest: float | None = None,
-    options: RangeLimitOptions = RangeLimitOptions(),
+    ratio_to_largest: float = RangeLimitOptions.peak_ratio_to_largest,
 ) -> float | None:
     """The distance (m) inside the limits (S,) up to which readings (S, B) form a peak; None without a peak.
 
     `inside` is the side of the usable readings: −1 below a limit, 1 above. A peak is one value, within a
-    millimetre, with `peak_ratio` times the mean count of the values inside it and `ratio_to_largest` (None:
-    that of the options) times the largest of these counts. Readings of a wall spread over several values.
+    millimetre, with `peak_ratio` times the mean count of the values inside it and `ratio_to_largest` times
+    the largest of these counts. Readings of a wall spread over several values.
     """
-    if ratio_to_largest is None:
-        ratio_to_largest = options.peak_ratio_to_largest
+    options = RangeLimitOptions()
     slack = ROUNDING * float(limits.max())
     outer, inner = (limits - inside * slack)[:, None], (limits + inside * options.compared_range)[:, None]
     low, high = np.minimum(outer, inner), np.maximum(outer, inner)

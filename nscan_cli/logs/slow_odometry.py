@@ -51,7 +51,7 @@ def without_repeats(
     changes = np.flatnonzero(~stands)
     before = np.searchsorted(changes, ends) - 1
     repeats = np.stack([np.where(before >= 0, changes[before] + 1, 0), ends + 1], axis=1)
-    if scans is not None and not _robot_drives(repeats, *scans, options):
+    if scans is not None and not _robot_drives(repeats, *scans):
         return odometry, ""
     durations = np.diff(times[repeats], axis=1)[:, 0]
     usual = float(np.median(durations))
@@ -65,21 +65,16 @@ def without_repeats(
     )
 
 
-def _robot_drives(
-    repeats: NDArray[np.int64],
-    readings: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    options: SlowOdometryOptions,
-) -> bool:
+def _robot_drives(repeats: NDArray[np.int64], readings: NDArray[np.float32], rows: NDArray[np.int64]) -> bool:
     """Whether readings (S, B) change as much while a pose is repeated as when it changes.
 
     rows: those of the readings (S,) in order of time.
     """
     changing: list[bool] = []
-    for first, last in repeats[:: max(1, len(repeats) // options.scans)].tolist():
+    for first, last in repeats[:: max(1, len(repeats) // SlowOdometryOptions.scans)].tolist():
         some = readings[rows[[first, last - 1, last]]]
         some = some[:, (np.isfinite(some) & (some > 0)).all(axis=0)]
         if some.size:
             meanwhile, at_change = np.median(np.abs(np.diff(some, axis=0)), axis=1).tolist()
-            changing.append(meanwhile >= options.min_change * at_change)
+            changing.append(meanwhile >= SlowOdometryOptions.min_change * at_change)
     return 2 * sum(changing) > len(changing)
