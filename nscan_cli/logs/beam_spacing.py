@@ -37,10 +37,10 @@ def checked_by_walls(
     rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
     widest = float(np.max(np.abs(directions.step) * (beams - 1)))
     # Walls mostly agree with the log, and a few scans show it.
-    if _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
+    if _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of])):
         return directions, []
-    scans = sampled_scans(raw, directions, limits, rows, spacing)
-    factor = _factor_of_walls(scans, spacing) or _factor_of_parts(scans, spacing)
+    scans = sampled_scans(raw, directions, limits, rows)
+    factor = _factor_of_walls(scans) or _factor_of_parts(scans)
     if factor is None or factor * widest > spacing.max_view:
         return directions, []
     count = int(np.bincount(beams).argmax())
@@ -50,7 +50,7 @@ def checked_by_walls(
     first, step = (float(np.median((values * orders)[of_count])) for values in directions)
     if np.median(orders) < 0:
         first, step = -first, -step
-    view, is_usual = _view(abs(step) * factor * (count - 1), factor, count, spacing)
+    view, is_usual = _view(abs(step) * factor * (count - 1), factor, count)
     found = math.copysign(_between(view, count), step)
     centred = -math.copysign(view, step) / 2
     said = (
@@ -96,9 +96,10 @@ def _is_round(step: float) -> bool:
     return abs(quarters - round(quarters)) < 1e-6
 
 
-def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
+def _walls_agree(scans: SampledScans) -> bool:
     """Whether most beams on walls tell the angle of the log, or nearly that."""
-    _logs, centres, counts = factors_by_walls(scans, options.widest_half_width, options)
+    options = BeamSpacingOptions()
+    _logs, centres, counts = factors_by_walls(scans, options.widest_half_width)
     best = int(counts.argmax()) if len(counts) else 0
     return (
         len(counts) > 0
@@ -107,11 +108,12 @@ def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
     )
 
 
-def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
+def _factor_of_walls(scans: SampledScans) -> float | None:
     """The factor from the steps of scans to the angle between beams that walls tell; None if they agree."""
+    options = BeamSpacingOptions()
 
     def told(half_width: float) -> float | None:
-        return _told_factor(scans, half_width, options)
+        return _told_factor(scans, half_width)
 
     factor = _settled(told, options.half_width)
     narrow = None if factor is None else told(options.narrow_half_width / factor)
@@ -120,14 +122,15 @@ def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float 
     return factor
 
 
-def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
+def _factor_of_parts(scans: SampledScans) -> float | None:
     """The factor that most beams on walls tell, if it differs from 1 in most parts of the log.
 
     None if it does not, or if other angles to the beams compared tell another one.
     """
+    options = BeamSpacingOptions()
 
     def told(some: SampledScans, half_width: float, min_beams: int) -> float | None:
-        return _settled(lambda width: _most_told(some, width, min_beams, options), half_width)
+        return _settled(lambda width: _most_told(some, width, min_beams), half_width)
 
     factor = told(scans, options.widest_half_width, options.min_beams)
     if factor is None or abs(math.log(factor)) < options.min_small_difference:
@@ -161,32 +164,32 @@ def _settled(told: Callable[[float], float | None], half_width: float) -> float 
     return None
 
 
-def _most_told(
-    scans: SampledScans, half_width: float, min_beams: int, options: BeamSpacingOptions
-) -> float | None:
+def _most_told(scans: SampledScans, half_width: float, min_beams: int) -> float | None:
     """The factor that most beams on walls tell; None for too few. `half_width` as in `_told_factor`."""
-    logs, centres, counts = factors_by_walls(scans, half_width, options)
-    return None if counts.max(initial=0) < min_beams else most_told_factor(logs, centres, counts, options)
+    logs, centres, counts = factors_by_walls(scans, half_width)
+    return None if counts.max(initial=0) < min_beams else most_told_factor(logs, centres, counts)
 
 
-def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOptions) -> float | None:
+def _told_factor(scans: SampledScans, half_width: float) -> float | None:
     """What most beams on walls tell; None if no factor stands out or it is near 1.
 
     half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
     """
-    logs, centres, counts = factors_by_walls(scans, half_width, options)
+    options = BeamSpacingOptions()
+    logs, centres, counts = factors_by_walls(scans, half_width)
     if len(centres) < options.min_beams:
         return None
     best = int(counts.argmax())
-    if counts[best] < max(options.min_beams, options.min_ratio * beams_as_log(logs, options)):
+    if counts[best] < max(options.min_beams, options.min_ratio * beams_as_log(logs)):
         return None
-    factor = most_told_factor(logs, centres, counts, options)
+    factor = most_told_factor(logs, centres, counts)
     return factor if abs(math.log(factor)) >= options.min_difference else None
 
 
-def _view(view: float, factor: float, beams: int, options: BeamSpacingOptions) -> tuple[float, bool]:
+def _view(view: float, factor: float, beams: int) -> tuple[float, bool]:
     """The field of view (rad) of so many beams that walls tell, or a usual one near it; and whether it is
     that. `factor` is that of the log's angle."""
+    options = BeamSpacingOptions()
     usual = min(options.usual_views, key=lambda angle: abs(math.log(angle / view)))
     near = options.usual_view
     if abs(math.log(factor)) < options.min_difference:

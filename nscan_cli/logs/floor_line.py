@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.beam_mask import Bearings, in_sectors
-from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, evenly, ranges_at, turning_scans
+from nscan_cli.logs.robot_parts import ScanTable, evenly, ranges_at, turning_scans
 from nscan_cli.poses import Array, Mask
 
 
@@ -90,7 +90,7 @@ class FloorLine(NamedTuple):
 def floor_line(table: ScanTable, sectors: Sequence[Bearings]) -> FloorLine | None:
     """The line of the floor in the scans of a log, outside some sectors; None if they show none, or the robot
     never turns."""
-    options, parts = FloorLineOptions(), RobotPartsOptions()
+    options = FloorLineOptions()
     step = abs(float(table.angle_increment[table.rows[0]]))
     every = int(np.clip(np.round(options.step / max(step, 1e-12)), 1, max(table.ranges.shape[1], 1)))
     spacing = every * step
@@ -105,7 +105,7 @@ def floor_line(table: ScanTable, sectors: Sequence[Bearings]) -> FloorLine | Non
     without_floor(without, table.angle_min, table.angle_increment, line)
     rest = table._replace(ranges=without)
     nothing: Mask = np.zeros(len(bearings), dtype=np.bool_)
-    turning = turning_scans(rest, bearings, nothing, parts)
+    turning = turning_scans(rest, bearings, nothing)
     if not len(turning):
         return None
     seen = ranges_at(table, turning, bearings)

@@ -105,19 +105,20 @@ class ScanTable(NamedTuple):
         return found
 
 
-def robot_parts(table: ScanTable, options: RobotPartsOptions = RobotPartsOptions()) -> list[Sector]:
+def robot_parts(table: ScanTable) -> list[Sector]:
     """The sectors in which the robot itself is in view, by increasing bearing; none if it never turns."""
+    options = RobotPartsOptions()
     # Increasing ones, of the scan with the finest step.
     bearings = np.sort(table.bearings(int(np.argmin(np.abs(table.angle_increment)))))
     some = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
-    constant, medians = _constant_beams(some, options)
+    constant, medians = _constant_beams(some)
     if not constant.any():
         return []
-    turning = turning_scans(table, bearings, constant, options)
+    turning = turning_scans(table, bearings, constant)
     if not len(turning):
         return []
     ranges = ranges_at(table, turning, bearings)
-    constant &= _kept(ranges, medians, options).mean(axis=0) >= options.min_turning_share
+    constant &= _kept(ranges, medians).mean(axis=0) >= options.min_turning_share
     return _sectors(bearings, constant, medians, options.margin)
 
 
@@ -140,15 +141,13 @@ def ranges_at(table: ScanTable, places: NDArray[np.int64], bearings: Array) -> N
     return found
 
 
-def _constant_beams(
-    ranges: NDArray[np.float32], options: RobotPartsOptions
-) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+def _constant_beams(ranges: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
     """Which beams of scans (n, B) mostly have the same near range, and the median (B,) of that; else nan."""
-    near = (ranges < options.max_range).mean(axis=0) >= options.min_share
+    near = (ranges < RobotPartsOptions.max_range).mean(axis=0) >= RobotPartsOptions.min_share
     medians = np.full(ranges.shape[1], np.nan, dtype=np.float32)
-    medians[near] = _medians_below(ranges[:, near], options.max_range)
+    medians[near] = _medians_below(ranges[:, near], RobotPartsOptions.max_range)
     constant = near.copy()
-    constant[near] = _kept(ranges[:, near], medians[near], options).mean(axis=0) >= options.min_share
+    constant[near] = _kept(ranges[:, near], medians[near]).mean(axis=0) >= RobotPartsOptions.min_share
     return constant, medians
 
 
@@ -161,26 +160,24 @@ def _medians_below(ranges: NDArray[np.float32], limit: float) -> NDArray[np.floa
     return found
 
 
-def _kept(
-    ranges: NDArray[np.float32], medians: NDArray[np.float32], options: RobotPartsOptions
-) -> NDArray[np.bool_]:
+def _kept(ranges: NDArray[np.float32], medians: NDArray[np.float32]) -> NDArray[np.bool_]:
     """(n, B) whether the ranges of scans equal the medians (B,) within the tolerance, m."""
+    options = RobotPartsOptions()
     tolerance = np.clip(options.relative_tolerance * medians, options.min_tolerance, options.max_tolerance)
     kept: NDArray[np.bool_] = np.abs(ranges - medians) <= tolerance
     return kept
 
 
-def turning_scans(
-    table: ScanTable, bearings: Array, constant: NDArray[np.bool_], options: RobotPartsOptions
-) -> NDArray[np.int64]:
+def turning_scans(table: ScanTable, bearings: Array, constant: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Places (n,) of scans in which the other beams show a turn of the robot; none if it turns too seldom."""
+    options = RobotPartsOptions()
     found = []
     for lag in options.lags:
         first = evenly(len(table.times), options.pairs)
         second = np.searchsorted(table.times, table.times[first] + lag)
         inside = second < len(table.times)
         pairs = np.stack([first[inside], second[inside]], axis=1)
-        turns = _turns(table, bearings, constant, pairs, options)
+        turns = _turns(table, bearings, constant, pairs)
         found.append(pairs[np.abs(turns) >= options.min_turn])
     first, last = np.concatenate(found).T
     if len(first) < options.min_pairs:
@@ -188,14 +185,9 @@ def turning_scans(
     return np.unique(np.linspace(first, last, options.scans_of_turn).astype(np.int64))
 
 
-def _turns(
-    table: ScanTable,
-    bearings: Array,
-    constant: NDArray[np.bool_],
-    pairs: NDArray[np.int64],
-    options: RobotPartsOptions,
-) -> Array:
+def _turns(table: ScanTable, bearings: Array, constant: NDArray[np.bool_], pairs: NDArray[np.int64]) -> Array:
     """(P,) turn between the scans of each pair, rad; 0 if no turn makes them alike."""
+    options = RobotPartsOptions()
     apart = abs(float(bearings[min(1, len(bearings) - 1)] - bearings[0]))
     # A damaged file may have beams in one direction.
     every = max(round(min(options.step / apart, len(bearings))), 1) if apart > 0.0 else 1

@@ -103,11 +103,7 @@ class SampledScans(NamedTuple):
 
 
 def sampled_scans(
-    raw: RawScans,
-    directions: BeamDirections,
-    limits: RangeLimits,
-    rows: NDArray[np.int64],
-    options: BeamSpacingOptions,
+    raw: RawScans, directions: BeamDirections, limits: RangeLimits, rows: NDArray[np.int64]
 ) -> SampledScans:
     """The scans in some rows whose readings have changed since the one before."""
     ranges = raw.ranges[rows].astype(np.float64)
@@ -118,14 +114,12 @@ def sampled_scans(
     for row in range(1, len(rows)):
         last = ranges[moved[-1]]
         change = np.abs(ranges[row] - last) / last
-        if 2 * np.count_nonzero(change > options.moved) > np.count_nonzero(change >= 0.0):
+        if 2 * np.count_nonzero(change > BeamSpacingOptions.moved) > np.count_nonzero(change >= 0.0):
             moved.append(row)
     return SampledScans(ranges[moved], np.abs(directions.step[rows[moved]]))
 
 
-def factors_by_walls(
-    scans: SampledScans, half_width: float, options: BeamSpacingOptions
-) -> tuple[Array, Array, NDArray[np.int64]]:
+def factors_by_walls(scans: SampledScans, half_width: float) -> tuple[Array, Array, NDArray[np.int64]]:
     """Factors by which walls say that the angle between beams is larger than in the log, as logarithms.
 
     Returns all of them, sorted (V,); those within `max_factor` (C,); and for each of these the number of all
@@ -138,16 +132,16 @@ def factors_by_walls(
     for half in np.unique(halves[halves > 0]).tolist():
         if 4 * half < scans.ranges.shape[1]:
             those = halves == half
-            rows, steps = _told_steps(scans.ranges[those], half, options)
+            rows, steps = _told_steps(scans.ranges[those], half)
             told.append(steps - np.log(scans.steps[those])[rows])
     logs = np.sort(np.concatenate(told))
-    centres = logs[np.abs(logs) <= math.log(options.max_factor)]
-    return logs, centres, _within(logs, centres, options.same_angle)
+    centres = logs[np.abs(logs) <= math.log(BeamSpacingOptions.max_factor)]
+    return logs, centres, _within(logs, centres, BeamSpacingOptions.same_angle)
 
 
-def beams_as_log(logs: Array, options: BeamSpacingOptions) -> int:
+def beams_as_log(logs: Array) -> int:
     """How many of some sorted logarithms of factors (V,) tell the angle of the log."""
-    return int(_within(logs, np.zeros(1), options.same_angle)[0])
+    return int(_within(logs, np.zeros(1), BeamSpacingOptions.same_angle)[0])
 
 
 def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
@@ -157,13 +151,13 @@ def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
     return found
 
 
-def _told_steps(ranges: Array, half: int, options: BeamSpacingOptions) -> tuple[NDArray[np.int64], Array]:
+def _told_steps(ranges: Array, half: int) -> tuple[NDArray[np.int64], Array]:
     """Rows (V,) of beams of scans (N, B) on walls, and logarithms (V,) of the angles that they tell."""
     near = 1 / ranges
     wide = _log_angles(near, 2 * half) - math.log(2 * half)
     narrow = _log_angles(near, half)[:, half : ranges.shape[1] - 3 * half] - math.log(half)
     with np.errstate(invalid="ignore"):
-        rows, beams = np.nonzero(np.abs(wide - narrow) < options.same_wall)
+        rows, beams = np.nonzero(np.abs(wide - narrow) < BeamSpacingOptions.same_wall)
     return rows, wide[rows, beams]
 
 
@@ -177,9 +171,7 @@ def _log_angles(near: Array, between: int) -> Array:
         return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
 
 
-def most_told_factor(
-    logs: Array, centres: Array, counts: NDArray[np.int64], options: BeamSpacingOptions
-) -> float:
+def most_told_factor(logs: Array, centres: Array, counts: NDArray[np.int64]) -> float:
     """The factor that most beams tell, from what `factors_by_walls` returns."""
     best = centres[int(counts.argmax())]
-    return math.exp(float(np.median(logs[np.abs(logs - best) <= options.same_angle])))
+    return math.exp(float(np.median(logs[np.abs(logs - best) <= BeamSpacingOptions.same_angle])))

@@ -60,7 +60,7 @@ def in_whole_revolutions(
     raw: RawScans, directions: BeamDirections, limits: RangeLimits, options: ReadingOptions
 ) -> tuple[BeamDirections, list[str]]:
     """The directions of beams over one revolution if walls show that they cover one; and the messages."""
-    checks, spacing = WholeRevolutionOptions(), BeamSpacingOptions()
+    checks = WholeRevolutionOptions()
     beams = beam_counts(raw.ranges, raw.beams)
     count, step = int(beams[0]), float(np.median(directions.step))
     off = count * abs(step) - 2 * math.pi
@@ -69,7 +69,7 @@ def in_whole_revolutions(
     if is_set or not is_near or (beams != count).any() or (directions.step != directions.step[0]).any():
         return directions, []
     rows = np.arange(0, len(beams), max(1, len(beams) // checks.max_scans))
-    ranges = sampled_scans(raw, directions, limits, rows, spacing).ranges[:, :count]
+    ranges = sampled_scans(raw, directions, limits, rows).ranges[:, :count]
     whole = math.copysign(2 * math.pi / count, step)
     beside = np.arange(-2, 3) * checks.tried
     gaps = [abs(step) - off, *(abs(whole) + beside).tolist()]
@@ -82,7 +82,7 @@ def in_whole_revolutions(
         return directions, []
     # A laser that looks ahead keeps its middle; others, their first direction.
     first, half = directions.first, 0.5 * (count - 1)
-    if abs(2 * float(first[0]) + step * (count - 1)) < spacing.max_off_centre * abs(step):
+    if abs(2 * float(first[0]) + step * (count - 1)) < BeamSpacingOptions.max_off_centre * abs(step):
         first = first + half * (step - whole)
     said = (
         f"{counted(count, 'beam')} with the {math.degrees(abs(step)):.5g}° of the log cover "

@@ -16,7 +16,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, Sector, robot_parts
+from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import compose
 from tests.data import data_file
 from tests.simulation import faults
@@ -40,7 +40,7 @@ def table_of(log: LaserLog) -> ScanTable:
 
 
 def found(log: LaserLog) -> list[Sector]:
-    return robot_parts(table_of(log), RobotPartsOptions())
+    return robot_parts(table_of(log))
 
 
 def sectors(*degrees: tuple[float, float, float]) -> list[tuple[float, float, float]]:

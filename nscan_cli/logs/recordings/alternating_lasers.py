@@ -43,10 +43,10 @@ class TwoLaserOptions:
 
 def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
     """The scans of the first laser alone, and the message for the user; all scans if there is one laser."""
-    scans, options = [message.scan for message in messages], TwoLaserOptions()
-    if not _alternate(scans, options):
+    scans = [message.scan for message in messages]
+    if not _alternate(scans):
         return list(messages), ""
-    is_first = _is_first(scans, options)
+    is_first = _is_first(scans)
     kept = [message for message, first in zip(messages, is_first.tolist(), strict=True) if first]
     said = (
         f"two lasers alternate in one frame, {scans[0].frame}: a scan resembles the one after the next; "
@@ -56,25 +56,25 @@ def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan],
     return kept, said
 
 
-def _alternate(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> bool:
+def _alternate(scans: Sequence[ScanMessage]) -> bool:
     """Whether scans resemble the second next, and not the next."""
+    options = TwoLaserOptions()
     if len(scans) < options.min_scans:
         return False
     rows = np.unique(np.linspace(0, len(scans) - 3, options.sample).astype(np.int64))
-    _, share = _differences(scans, rows[:: options.first_of], options)
+    _, share = _differences(scans, rows[:: options.first_of])
     if share < options.one_laser_share:
         return False
-    to_next, share = _differences(scans, rows, options)
+    to_next, share = _differences(scans, rows)
     return to_next >= options.min_difference and share >= options.min_share
 
 
-def _differences(
-    scans: Sequence[ScanMessage], rows: Indices, options: TwoLaserOptions
-) -> tuple[float, float]:
+def _differences(scans: Sequence[ScanMessage], rows: Indices) -> tuple[float, float]:
     """The median difference between some scans and the next, and the share that resembles the second next.
 
     Zeros where no scans compare.
     """
+    options = TwoLaserOptions()
     to_next, to_second = (
         np.array([_difference(scans[row], scans[row + later], options.min_compared) for row in rows.tolist()])
         for later in (1, 2)
@@ -86,11 +86,12 @@ def _differences(
     return float(np.median(to_next[known])), float(alternates.mean())
 
 
-def _is_first(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> NDArray[np.bool_]:
+def _is_first(scans: Sequence[ScanMessage]) -> NDArray[np.bool_]:
     """(S,) whether each scan is of the laser of the first one.
 
     The lasers alternate, unless a scan is clearly more like the one before: then one of the other is missing.
     """
+    options = TwoLaserOptions()
     found = np.zeros(len(scans), dtype=np.bool_)
     found[0] = True
     latest: dict[bool, int] = {True: 0, False: 1}
