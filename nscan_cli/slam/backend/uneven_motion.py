@@ -21,7 +21,7 @@ from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Mask, relative, wrap
 from nscan_cli.slam.backend.options import UnevenMotionOptions
-from nscan_cli.slam.backend.uneven_path_energy import FIT, TimedPoints, UnevenPathEnergy
+from nscan_cli.slam.backend.uneven_path_energy import TimedPoints, UnevenPathEnergy
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -133,14 +133,9 @@ class _Run:
         beside = len(self._moving.times[self._near]) - (self._rows[1] + 1 - self._rows[0])
         if beside < uneven.scans or len(seen.points) < uneven.min_points * sweeps:
             return False
-        energy = UnevenPathEnergy(self._reference(), seen, self._times, start, uneven)
-        _, before = energy.least(start, uneven.widenings[-1], uneven.tolerance, 0)
-        for widening in uneven.widenings:
-            enough = uneven.tolerance if widening == uneven.widenings[-1] else uneven.coarse_tolerance
-            self._knots, after = energy.least(self._knots, widening, enough, uneven.iterations)
+        self._knots, gain = UnevenPathEnergy(self._reference(), seen, self._times, start, uneven).least()
         off = np.abs(self._knots - start)[:: uneven.parts]
         near = (off < uneven.max_sigmas * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
-        gain = before.terms[FIT] - after.terms[FIT]
         return bool(near) and gain > uneven.min_gain * (len(start) - 1)
 
     def _reference(self) -> Ndt:

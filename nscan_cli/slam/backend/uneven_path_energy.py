@@ -91,27 +91,23 @@ class UnevenPathEnergy:
         group = groups * part + np.minimum((groups * shares).astype(np.int64), groups - 1)
         ends = np.searchsorted(group, np.arange(groups * len(seconds) + 1))
         sigmas = np.array([options.sigma, options.turn_sigma, options.speed_change, options.turn_change])
-        self.pattern = _band_pattern(len(times))
+        self._options, self._pattern = options, _band_pattern(len(times))
         self._problem = UnevenPathProblem(
             reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
             options.scale, sigmas,
         )  # fmt: skip
 
-    def least(
-        self, knots: Array, widening: float, tolerance: float, iterations: int
-    ) -> tuple[Array, UnevenPathSystem]:
-        """The knots (K, 3) of least energy, by damped Newton steps from `knots` (K, 3) on, and the energy
-        there.
+    def least(self) -> tuple[Array, float]:
+        """The knots (K, 3) of least energy, and how much better the points fit there than at the start.
 
-        It ends with a step that moves no knot by more than `tolerance` (m, rad). Without `iterations` it
-        evaluates the energy at `knots`.
+        Each stage ends with a step that moves no knot by more than its tolerance.
         """
-        knots = knots.copy()
-        system = UnevenPathSystem(
-            np.empty(3), np.empty((len(knots), 3)), np.empty((len(self.pattern.rows), 3, 3))
-        )
-        _descend(self._problem, self.pattern, knots, widening, tolerance, iterations, system)
-        return knots, system
+        knots, options = self._problem.start.copy(), self._options
+        tolerances = np.full(len(options.widenings), options.coarse_tolerance)
+        tolerances[-1] = options.tolerance
+        stages = np.array(options.widenings), tolerances
+        gain = _descend(self._problem, self._pattern, knots, stages, options.iterations)
+        return knots, gain
 
 
 def _band_pattern(nodes: int) -> Pattern:
@@ -125,6 +121,28 @@ def _band_pattern(nodes: int) -> Pattern:
 
 @kernel
 def _descend(
+    problem: UnevenPathProblem, pattern: Pattern, knots: Array, stages: tuple[Array, Array], iterations: int
+) -> float:
+    """Minimise from the knots (K, 3), in place; returns how much better the points fit then.
+
+    `stages` are the widenings (n,) and the tolerances (n,). The pattern has the knots in order.
+    """
+    widenings, tolerances = stages
+    here, there = _empty_system(pattern, knots), _empty_system(pattern, knots)
+    _evaluate(problem, pattern.starts, knots, widenings[-1], here)
+    before = here.terms[FIT]
+    for stage in range(len(widenings)):
+        _descend_stage(problem, pattern, knots, widenings[stage], tolerances[stage], iterations, here, there)
+    return float(before - here.terms[FIT])
+
+
+@kernel
+def _empty_system(pattern: Pattern, knots: Array) -> UnevenPathSystem:
+    return UnevenPathSystem(np.empty(3), np.empty_like(knots), np.empty((len(pattern.rows), 3, 3)))
+
+
+@kernel
+def _descend_stage(
     problem: UnevenPathProblem,
     pattern: Pattern,
     knots: Array,
@@ -132,12 +150,9 @@ def _descend(
     tolerance: float,
     iterations: int,
     here: UnevenPathSystem,
+    there: UnevenPathSystem,
 ) -> None:
-    """Minimise from the knots (K, 3), in place, after Levenberg and Marquardt. Writes the energy there.
-
-    The pattern has the knots in order.
-    """
-    there = UnevenPathSystem(np.empty(3), np.empty_like(here.gradient), np.empty_like(here.hessian))
+    """Minimise from the knots (K, 3), in place, after Levenberg and Marquardt. Writes the energy `here`."""
     damped, diagonal = np.empty_like(here.hessian), np.empty_like(knots)
     trial, damping = np.empty_like(knots), PAIRWISE_STEPS.first
     step, gathered = np.empty(knots.size), np.empty(knots.size)
@@ -190,10 +205,9 @@ def _evaluate(
         for a in range(3):
             step[a] = knots[part + 1, a] - knots[part, a]
             pose[a] = knots[part, a] + after * step[a]
-        for k in range(begin, end):
-            _seen_from_group(problem.points[k], problem.shares[k] - after, step, pose[2], moved[k])
+        _seen_from_group(problem.points[begin:end], problem.shares[begin:end], after, step, pose[2], moved)
         evaluate_energy(
-            problem.grid, problem.half, moved[begin:end], pose, widening, 0.0, 0.0, 1, buffers, out
+            problem.grid, problem.half, moved[: end - begin], pose, widening, 0.0, 0.0, 1, buffers, out
         )
         terms[FIT] += problem.scale * out[0]
         first, second = starts[part], starts[part + 1]
@@ -221,16 +235,24 @@ def _evaluate(
 
 
 @leaf_kernel
-def _seen_from_group(point: Array, share: float, step: Array, heading: float, out: Array) -> None:
-    """Write a point (2,), seen `share` of the step (3,) of its part after the pose of its group, from there.
+def _seen_from_group(
+    points: Array, shares: Array, at: float, step: Array, heading: float, out: Array
+) -> None:
+    """Write points (m, 2) from the pose of their group, at a share of the step (3,) of their part.
 
-    Within a part the chord is as good as the arc.
+    They were seen at the `shares` (m,) of it. Within a part the chord is as good as the arc.
     """
     cos, sin = np.cos(heading), np.sin(heading)
-    dx, dy, turn = share * step[0], share * step[1], share * step[2]
-    c, s = np.cos(turn), np.sin(turn)
-    out[0] = c * point[0] - s * point[1] + cos * dx + sin * dy
-    out[1] = s * point[0] + c * point[1] + cos * dy - sin * dx
+    ahead, aside = cos * step[0] + sin * step[1], cos * step[1] - sin * step[0]
+    for k in range(points.shape[0]):
+        share = shares[k] - at
+        # The series are exact to 1e-12 at half a radian.
+        turn = share * step[2]
+        t = turn * turn
+        c = 1.0 - t / 2.0 * (1.0 - t / 12.0 * (1.0 - t / 30.0 * (1.0 - t / 56.0 * (1.0 - t / 90.0))))
+        s = turn * (1.0 - t / 6.0 * (1.0 - t / 20.0 * (1.0 - t / 42.0 * (1.0 - t / 72.0))))
+        out[k, 0] = c * points[k, 0] - s * points[k, 1] + share * ahead
+        out[k, 1] = s * points[k, 0] + c * points[k, 1] + share * aside
 
 
 @leaf_kernel
