@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import TypeVar
 
 from nscan_cli.files.text import counted
@@ -13,17 +14,20 @@ KEY = 40
 
 
 def without_copies(records: Sequence[Record], content: Callable[[Record], bytes]) -> tuple[list[Record], str]:
-    """The records whose content no earlier one has, but the one just before; and what to say, empty if all.
+    """The records whose content no earlier one has; and what to say, empty if these are all.
 
-    Records hold their time, so that two alike are one. Those beside each other may be of a robot that stands,
-    in a log without times.
+    Records hold their time, so that two alike are one. In a log without times some beside each other may be
+    of a robot that stands. There each comes as often as the robot stood long, in a log written twice or more
+    times over all come equally often.
     """
     texts = [content(record) for record in records]
     if len({(text[:KEY], text[-KEY:]) for text in texts}) == len(texts):
         return list(records), ""
     seen, kept = set[bytes](), list[Record]()
+    times = [len(list(alike)) for _, alike in groupby(texts)]
+    may_stand = times[0] == 1 or len(set(times)) > 1
     for row, (record, text) in enumerate(zip(records, texts, strict=True)):
-        if text not in seen or text == texts[row - 1] or len(text) < KEY:
+        if text not in seen or (may_stand and text == texts[row - 1]) or len(text) < KEY:
             kept.append(record)
         seen.add(text)
     copies = counted(len(records) - len(kept), "record")

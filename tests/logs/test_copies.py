@@ -23,6 +23,8 @@ def test_later_copies_are_left_out_but_not_of_a_robot_that_stands():
     assert kept == [KEY * text for text in (b"1", b"2", b"2", b"2", b"3", b"4")]
     assert said == "2 records " + SAID
     assert without_copies(records[:5], same) == (records[:5], "")
+    doubled = [KEY * text for text in (b"1", b"1", b"2", b"2", b"3", b"3")]
+    assert without_copies(doubled, same) == (doubled[::2], "3 records " + SAID)
     damaged = [b"1", b"2", b"1"]
     assert without_copies(damaged, same) == (damaged, "")
     # Records that are alike at both ends may differ between these.
@@ -36,6 +38,15 @@ def test_a_text_log_that_was_joined_to_itself(tmp_path):
     np.testing.assert_array_equal(twice.ranges, once.ranges)
     np.testing.assert_array_equal(twice.times, once.times)
     assert once.report.warnings == ()
+    assert twice.report.warnings == (f"{len(once)} records {SAID}",)
+
+
+def test_a_text_log_whose_records_were_written_twice(tmp_path):
+    written = carmen(readings())
+    once = lines.read(tmp_path, *written)
+    twice = lines.read(tmp_path, *(line for each in written for line in (each, each)))
+    np.testing.assert_array_equal(twice.ranges, once.ranges)
+    np.testing.assert_array_equal(twice.times, once.times)
     assert twice.report.warnings == (f"{len(once)} records {SAID}",)
 
 
