@@ -25,7 +25,7 @@ def without_copies(records: Sequence[Record], content: Callable[[Record], bytes]
         return list(records), ""
     seen, kept = set[bytes](), list[Record]()
     times = [len(list(alike)) for _, alike in groupby(texts)]
-    may_stand = times[0] == 1 or len(set(times)) > 1
+    may_stand = len(times) == 1 or times[0] == 1 or len(set(times)) > 1
     for row, (record, text) in enumerate(zip(records, texts, strict=True)):
         if text not in seen or (may_stand and text == texts[row - 1]) or len(text) < KEY:
             kept.append(record)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.shared_stamps import spread_stamps
 from nscan_cli.logs.stamp_unit import stamp_unit
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A time in seconds as text. Other texts that float() accepts, such as 1_0, are none."""
@@ -50,7 +50,7 @@ class ScanOrder:
     """The scans of a log in order of time."""
 
     rows: NDArray[np.int64]
-    """(S,) positions in the file of the scans in order of time"""
+    """(S,) positions in the file of the scans in order of time, without copies"""
     times: Array
     """(S,) times in order, s"""
     stamps: list[str]
@@ -60,6 +60,31 @@ class ScanOrder:
     nominal: bool
     """Whether the stamps are unusable and the times made up"""
     warnings: list[str]
+
+
+def scans_by_time(stamps: list[str], ranges: NDArray[np.float32]) -> ScanOrder:
+    """Scans sorted by their stamps, with readings (S, B), without those that repeat the one before.
+
+    A driver or a recorder has sent these twice: they have its stamp and its readings.
+    """
+    copies = _are_copies(stamps, ranges)
+    if copies.any():
+        kept = np.flatnonzero(~copies)
+        order = by_time([stamps[row] for row in kept.tolist()])
+        # Without times, scans that are alike are of a robot that stands.
+        if not order.nominal and len(kept) > 1:
+            said = f"{counted(int(copies.sum()), 'scan')} with stamp and readings of the one before: left out"
+            return replace(order, rows=kept[order.rows], warnings=[said, *order.warnings])
+    return by_time(stamps)
+
+
+def _are_copies(stamps: list[str], ranges: NDArray[np.float32]) -> Mask:
+    """(S,) which scans have the stamp and the readings of the one before."""
+    copies = np.array([row > 0 and stamp == stamps[row - 1] for row, stamp in enumerate(stamps)], np.bool_)
+    rows = np.flatnonzero(copies)
+    one, other = ranges[rows], ranges[rows - 1]
+    copies[rows] = ((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
+    return copies
 
 
 def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -> ScanOrder:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.scan_order import by_time, nearest_in_time, selected_numbers
+from nscan_cli.logs.scan_order import by_time, nearest_in_time, scans_by_time, selected_numbers
 
 
 def test_sorted_stably_and_counted():
@@ -124,3 +124,18 @@ def test_a_clock_that_is_set_back_by_more_than_a_drive_lasts_goes_on():
     assert order.rows.tolist() == list(range(200))
     np.testing.assert_allclose(np.diff(order.times), 0.2, atol=1e-6)
     assert order.warnings[0].startswith("the clock was set back by 1700000000.0 s at scan 120")
+
+
+def test_scans_sent_twice_are_read_once_and_those_of_a_robot_that_stands_all():
+    ranges = np.repeat(np.random.default_rng(1).uniform(1.0, 5.0, (4, 3)), 2, axis=0).astype(np.float32)
+    ranges[4:6, 1] = np.nan
+    stamps = [f"{row // 2}.0" for row in range(8)]
+    order = scans_by_time(stamps, ranges)
+    assert order.rows.tolist() == [0, 2, 4, 6]
+    assert order.stamps == ["0.0", "1.0", "2.0", "3.0"]
+    assert order.warnings == ["4 scans with stamp and readings of the one before: left out"]
+    ranges[5, 0] += 0.01
+    assert scans_by_time(stamps, ranges).rows.tolist() == [0, 2, 4, 5, 6]
+    without_times = scans_by_time(["0"] * 8, ranges)
+    assert without_times.nominal
+    assert len(without_times.rows) == 8

@@ -60,7 +60,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         timed = _of_one_laser(timed, findings)
         scans, stamps, log_times = (list(column) for column in zip(*timed, strict=True))
     raw = _raw_scans(scans, [decimal_seconds(stamp) for stamp in stamps])
-    times = order.by_time(raw.stamps)
+    times = order.scans_by_time(raw.stamps, raw.ranges)
     findings.warnings += times.warnings
     tree = TransformTree(recording, skips)
     clock = ScanClock(times, use_stamps, _recording_delay(stamps, log_times))

@@ -110,9 +110,9 @@ def _scan_order(
     lines: list[tuple[int, bytes]], scans: CarmenScans, warnings: list[str]
 ) -> tuple[order.ScanOrder, bool]:
     """The scans in order of time, and whether the logger's stamps replace the scans' own, unusable ones."""
-    times = order.by_time(scans.stamps)
+    times = order.scans_by_time(scans.stamps, scans.ranges)
     if times.nominal or not times.times.any():
-        logged = order.by_time(carmen_records.logger_stamps(lines, scans))
+        logged = order.scans_by_time(carmen_records.logger_stamps(lines, scans), scans.ranges)
         if not logged.nominal and logged.times[-1] > logged.times[0]:
             warnings += ["the scans' own time stamps are unusable: the logger's are used", *logged.warnings]
             return logged, True

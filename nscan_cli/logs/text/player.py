@@ -77,7 +77,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         findings.used["laser"] += f", bearings in {scans.bearings}"
     if _begin_at_zero(scans):
         findings.warnings.append(BEGINS_AT_ZERO)
-    times = order.by_time(scans.raw.stamps)
+    times = order.scans_by_time(scans.raw.stamps, scans.raw.ranges)
     findings.warnings += times.warnings
     mount = _player_mount(laser, lines, findings)
     motion = RecordedMotion(_odometry(scans, lines, times, findings))

@@ -62,7 +62,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     raw = _script_scans(records[laser], skips)
     if not raw.stamps:
         raise skips.nothing_read(f"{laser} record")
-    times = order.by_time(raw.stamps)
+    times = order.scans_by_time(raw.stamps, raw.ranges)
     findings.warnings += times.warnings
     mount = np.array(options.mount or (0.0, 0.0, 0.0), dtype=np.float64)
     findings.used["mounting"] = "--mount" if options.mount else "assumed: at the robot's centre"
