@@ -40,6 +40,9 @@ class ScanOrderOptions:
     """A clock was also set back where all later stamps lie by more than this before the earlier ones, s: no
     drive lasts so long. There are at least `min_alternations` of both. A larger value finds fewer such
     clocks."""
+    min_regular_share: float = 0.8
+    """A laser is read more often than it measures if at least this share of its scans are repeated equally
+    often. A larger value leaves more repeated scans in the log."""
     longest_pause: float = 60.0
     """Longest pause between two files of one recording, s: a recorder that splits goes on at once. A larger
     value joins more files."""
@@ -62,29 +65,40 @@ class ScanOrder:
     warnings: list[str]
 
 
-def scans_by_time(stamps: list[str], ranges: NDArray[np.float32]) -> ScanOrder:
+def scans_by_time(
+    stamps: list[str], ranges: NDArray[np.float32], options: ScanOrderOptions = ScanOrderOptions()
+) -> ScanOrder:
     """Scans sorted by their stamps, with readings (S, B), without those that repeat the one before.
 
-    A driver or a recorder has sent these twice: they have its stamp and its readings.
+    A driver or a recorder has sent these again: with the same stamp, or at a higher rate than that of the
+    laser, all of them equally often.
     """
-    copies = _are_copies(stamps, ranges)
-    if copies.any():
-        kept = np.flatnonzero(~copies)
-        order = by_time([stamps[row] for row in kept.tolist()])
+    repeats = _repeats_reading(ranges)
+    begins = np.flatnonzero(~repeats)
+    lengths = np.diff(np.append(begins, len(stamps)))
+    usual = int(np.median(lengths)) if len(lengths) else 1
+    if usual == 1 or np.mean(lengths == usual) < options.min_regular_share:
+        rows = np.flatnonzero(repeats)
+        repeats[rows] = [stamps[row] == stamps[row - 1] for row in rows.tolist()]
+    if repeats.any():
+        kept = np.flatnonzero(~repeats)
+        order = by_time([stamps[row] for row in kept.tolist()], options)
         # Without times, scans that are alike are of a robot that stands.
         if not order.nominal and len(kept) > 1:
-            said = f"{counted(int(copies.sum()), 'scan')} with stamp and readings of the one before: left out"
+            said = f"{counted(int(repeats.sum()), 'scan')} with the readings of the one before: left out"
             return replace(order, rows=kept[order.rows], warnings=[said, *order.warnings])
-    return by_time(stamps)
+    return by_time(stamps, options)
 
 
-def _are_copies(stamps: list[str], ranges: NDArray[np.float32]) -> Mask:
-    """(S,) which scans have the stamp and the readings of the one before."""
-    copies = np.array([row > 0 and stamp == stamps[row - 1] for row, stamp in enumerate(stamps)], np.bool_)
-    rows = np.flatnonzero(copies)
-    one, other = ranges[rows], ranges[rows - 1]
-    copies[rows] = ((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
-    return copies
+def _repeats_reading(ranges: NDArray[np.float32]) -> Mask:
+    """(S,) which scans have the readings (S, B) of the one before, each to the last bit."""
+    bits = np.ascontiguousarray(ranges, np.float32).view(np.int32)
+    some = bits[:, :: max(bits.shape[1] // 8, 1)]
+    repeats = np.append(False, (some[1:] == some[:-1]).all(axis=1))[: len(bits)]
+    # A few beams tell nearly all scans apart.
+    rows = np.flatnonzero(repeats)
+    repeats[rows] = (bits[rows] == bits[rows - 1]).all(axis=1)
+    return repeats
 
 
 def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -> ScanOrder:

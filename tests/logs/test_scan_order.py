@@ -133,7 +133,9 @@ def test_scans_sent_twice_are_read_once_and_those_of_a_robot_that_stands_all():
     order = scans_by_time(stamps, ranges)
     assert order.rows.tolist() == [0, 2, 4, 6]
     assert order.stamps == ["0.0", "1.0", "2.0", "3.0"]
-    assert order.warnings == ["4 scans with stamp and readings of the one before: left out"]
+    assert order.warnings == ["4 scans with the readings of the one before: left out"]
+    at_twice_the_rate = scans_by_time([f"{0.1 * row:.1f}" for row in range(8)], ranges)
+    assert at_twice_the_rate.stamps == ["0.0", "0.2", "0.4", "0.6"]
     ranges[5, 0] += 0.01
     assert scans_by_time(stamps, ranges).rows.tolist() == [0, 2, 4, 5, 6]
     without_times = scans_by_time(["0"] * 8, ranges)
