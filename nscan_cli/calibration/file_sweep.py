@@ -16,8 +16,7 @@ def file_sweep_times(log: LaserLog) -> Array:
     """(S,) the times of the sweeps, s, negative where the readings are in the reverse order; 0: at once."""
     if log.beam_times is None:
         return np.zeros(len(log))
-    found: Array = log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
-    return found
+    return log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
 
 
 def with_sweep_times(log: LaserLog, seconds: Array, stamp: str) -> LaserLog:

@@ -107,8 +107,7 @@ def fit_mount(
 def robot_lengths(laser: Array, mount: Array) -> Array:
     """(n,) lengths of the robot's steps, m, by those of its laser (n, 3), which is mounted at (3,)."""
     robot = relative(compose(compose(mount, laser), relative(np.zeros(3), mount)), np.zeros(3))
-    lengths: Array = np.hypot(robot[:, 0], robot[:, 1])
-    return lengths
+    return np.hypot(robot[:, 0], robot[:, 1])
 
 
 def _covariance(fit: RobustFit, size: float) -> Array:

@@ -55,8 +55,7 @@ def _as_most(is_large: Mask, moves: Mask, options: OdometryUnitOptions) -> Mask:
     at = np.flatnonzero(moves)
     most = _about_each(is_large[at], options.beside) >= options.most_beside
     most |= is_large[at] & (_about_each(most, options.beside) > 0)
-    found: Mask = most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)]
-    return found
+    return most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)]
 
 
 def _about_each(mask: Mask, beside: int) -> Indices:

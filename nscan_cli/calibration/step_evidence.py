@@ -150,8 +150,7 @@ class StepEvidence:
 
 def _moves(steps: Array, least: float) -> Mask:
     """(n,) which steps (n, 3) go so far (m) or turn so much (rad)."""
-    moves: Mask = (np.hypot(steps[:, 0], steps[:, 1]) >= least) | (np.abs(steps[:, 2]) >= least)
-    return moves
+    return (np.hypot(steps[:, 0], steps[:, 1]) >= least) | (np.abs(steps[:, 2]) >= least)
 
 
 def _length_sigmas(laser: Array, covariances: Array) -> Array:

@@ -61,8 +61,7 @@ class SweepEvidence:
         """Columns (P, ...) without what is far from their medians."""
         middle = np.median(values, axis=0)
         most = self.options.outlier_sigmas * TO_SIGMA * np.median(np.abs(values - middle), axis=0)
-        found: Array = np.clip(values, middle - most, middle + most)
-        return found
+        return np.clip(values, middle - most, middle + most)
 
 
 def sweep_evidence(

@@ -19,5 +19,4 @@ def turn_differences(
     (at, headings), (begins, ends) = odometry, steps
     told = np.interp(ends - offsets[:, None], at, headings)
     told -= np.interp(begins - offsets[:, None], at, headings)
-    found: Array = np.abs(told - turned)
-    return found
+    return np.abs(told - turned)

@@ -55,5 +55,4 @@ def _pair_keys(nodes: Sequence[int]) -> Indices:
     """(n (n − 1) / 2,) the pairs of n nodes, each packed into one integer."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
     a, b = upper_indices(len(ordered), 1)
-    pairs: Indices = ordered[a] << 32 | ordered[b]
-    return pairs
+    return ordered[a] << 32 | ordered[b]

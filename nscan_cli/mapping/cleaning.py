@@ -86,5 +86,4 @@ def _connected(free: Mask, start: tuple[Indices, Indices]) -> Mask:
     labels, count = ndimage.label(space)
     reached = np.zeros(count + 1, dtype=np.bool_)
     reached[np.unique(labels[start])] = True
-    connected: Mask = reached[labels] & free
-    return connected
+    return reached[labels] & free

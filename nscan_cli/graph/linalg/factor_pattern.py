@@ -87,8 +87,7 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
     nodes = len(pattern.place)
     blocks = np.repeat(np.arange(nodes), np.diff(pattern.starts)) * nodes + pattern.rows
     indices = np.searchsorted(blocks, np.minimum(rows, columns) * nodes + np.maximum(rows, columns))
-    targets: Indices = np.where((edges >= 0).all(axis=1), 2 * indices + (rows < columns), -1)
-    return targets
+    return np.where((edges >= 0).all(axis=1), 2 * indices + (rows < columns), -1)
 
 
 @kernel

@@ -97,5 +97,4 @@ def _marginal_weights(information: Array) -> Array:
     size = information.shape[1]
     largest = np.abs(information).max(axis=(1, 2), initial=0.0)[:, None, None]
     regular = information + REGULARISATION * np.where(largest > 0, largest, 1.0) * np.eye(size)
-    weights: Array = 1 / np.diagonal(np.linalg.inv(regular), axis1=1, axis2=2)[:, 2::3]
-    return weights
+    return 1 / np.diagonal(np.linalg.inv(regular), axis1=1, axis2=2)[:, 2::3]

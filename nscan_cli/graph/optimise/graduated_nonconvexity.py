@@ -86,8 +86,7 @@ def chi2_bounds(energy: GraphEnergy, options: RobustOptions) -> Array:
     from scipy.special import chdtri
 
     freedom = 3.0 * (np.diff(energy.columns.starts) - 1)
-    bounds: Array = options.bound_factor * np.asarray(chdtri(freedom, options.tail_probability), np.float64)
-    return bounds
+    return options.bound_factor * np.asarray(chdtri(freedom, options.tail_probability), np.float64)
 
 
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:

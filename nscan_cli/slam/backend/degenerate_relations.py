@@ -132,5 +132,4 @@ def _direction(step: Array, heading: float) -> Array:
 def _less_certain(information: Array, motion: Array, variance: float) -> Array:
     """Information (n, n) with a variance added along a motion (n,): Sherman and Morrison's formula."""
     row = information @ motion
-    less: Array = information - np.outer(row, row) * (variance / (1.0 + variance * float(motion @ row)))
-    return less
+    return information - np.outer(row, row) * (variance / (1.0 + variance * float(motion @ row)))

@@ -38,7 +38,4 @@ def with_even_steps(
 
 def _sizes(steps: Array, options: SingleScanOptions) -> Array:
     """(n,) sizes of differences of poses (n, 3), m."""
-    sizes: Array = np.sqrt(
-        steps[:, 0] ** 2 + steps[:, 1] ** 2 + (options.metres_per_radian * steps[:, 2]) ** 2
-    )
-    return sizes
+    return np.sqrt(steps[:, 0] ** 2 + steps[:, 1] ** 2 + (options.metres_per_radian * steps[:, 2]) ** 2)

@@ -35,8 +35,7 @@ def sees_the_same(scan: TrackedBatch, seen: TrackedBatch, options: BreakOptions)
 
 def see_enough(batch: TrackedBatch, options: BreakOptions) -> NDArray[np.bool_]:
     """(n,) which of the scans have points enough to compare views."""
-    enough: NDArray[np.bool_] = np.diff(batch.scans.ends) >= options.view.min_sectors
-    return enough
+    return np.diff(batch.scans.ends) >= options.view.min_sectors
 
 
 def count_undoubted(batch: TrackedBatch, seen_before: TrackedBatch | None, options: BreakOptions) -> int:

@@ -96,8 +96,7 @@ def _steps(odometry: Array, times: Array) -> OdometrySteps:
 
 def _sizes(motions: Array) -> Array:
     """(N,) lengths of motions (N, 3), m + rad."""
-    found: Array = np.hypot(motions[:, 0], motions[:, 1]) + np.abs(motions[:, 2])
-    return found
+    return np.hypot(motions[:, 0], motions[:, 1]) + np.abs(motions[:, 2])
 
 
 def _stalls(

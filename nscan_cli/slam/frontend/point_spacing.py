@@ -51,5 +51,4 @@ def points_between(points: Array, options: GaussianOptions, longest: float) -> A
     counts = np.where(gaps <= longest, np.ceil(gaps / spacing) - 1, 0).clip(0).astype(np.int64)
     before = np.repeat(np.arange(len(counts)), counts)
     number = 1 + np.arange(len(before)) - np.repeat(np.cumsum(counts) - counts, counts)
-    between: Array = points[before] + (number / (counts[before] + 1))[:, None] * steps[before]
-    return between
+    return points[before] + (number / (counts[before] + 1))[:, None] * steps[before]

@@ -148,5 +148,4 @@ def why_too_few(
 
 def is_lost(sigma: RelativeSigma, options: LoopClosureOptions) -> Mask:
     """(K,) whether not even the direction to a keyframe is known: the track has broken since."""
-    lost: Mask = options.sigmas * sigma.angle >= np.pi
-    return lost
+    return options.sigmas * sigma.angle >= np.pi
