@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from nscan_cli.calibration.agreeing_odometry import (
+from nscan_cli.calibration.bearing_jitter import checked_bearings
+from nscan_cli.calibration.changed_odometry import (
     with_mirrored_odometry,
     with_scaled_odometry,
     with_seen_mount,
 )
-from nscan_cli.calibration.bearing_jitter import checked_bearings
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.contradictions import changed_view, find_contradictions

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.calibration.changed_odometry import with_scaled_steps
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import UnsignedOdometryOptions
 from nscan_cli.calibration.options import StepOptions
-from nscan_cli.calibration.scaled_steps import with_scaled_steps
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names
@@ -53,8 +53,7 @@ def checked_signs(
         "odometry counts reversing as driving forward: the scans show the robot going the other way from "
         f"scan {names}; odometry is reversed there; --as-recorded uses it as it is"
     )
-    reversed_log = with_scaled_steps(log, ((each.begin, each.end) for each in stretches), -1.0)
-    return reversed_log, [message]
+    return with_scaled_steps(log, [(each.begin, each.end) for each in stretches], -1.0), [message]
 
 
 def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[ReversedStretch]:

@@ -9,15 +9,15 @@ off odometry by about the same, and a map without that is off by less.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.calibration.changed_odometry import with_changed_odometry
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, are_known, relative, wrap
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import LoopProgress, run_slam
@@ -101,13 +101,7 @@ def systematic_error(
 
 def without_systematic_error(log: LaserLog, error: SystematicError) -> LaserLog:
     """The log with its odometry corrected."""
-    path = log.odometry_path
-    assert log.odometry is not None
-    return replace(
-        log,
-        odometry=_corrected(log.odometry, error),
-        odometry_path=None if path is None else robot_path(path.times, _corrected(path.poses, error)),
-    )
+    return with_changed_odometry(log, lambda poses, _times: _corrected(poses, error))
 
 
 def _pieces(poses: Array, odometry: Array, breaks: Sequence[int], options: SystematicErrorOptions) -> Array:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from nscan_cli.calibration.changed_odometry import with_changed_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_excerpt import excerpt
-from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import MIRRORED, Array, Indices
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
@@ -43,11 +43,8 @@ class MappedPath:
 
 def mirrored(log: LaserLog) -> LaserLog:
     """The log of the mirror image of the world: the x axes are the mirror."""
-    path = log.odometry_path
     return replace(
-        log,
-        odometry=None if log.odometry is None else log.odometry * MIRRORED,
-        odometry_path=None if path is None else robot_path(path.times, path.poses * MIRRORED),
+        with_changed_odometry(log, lambda poses, _times: poses * MIRRORED),
         mount=log.mount * MIRRORED,
         angle_min=-log.angle_min,
         angle_increment=-log.angle_increment,
