@@ -8,7 +8,7 @@ the same confirmation by the search.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -78,16 +78,10 @@ class LoopDetector:
         """
         if route.paths[centre] - self._searched < self.options.search_interval:
             return []
-        bound = self._uncertainty.upper_bound(centre, self.tracked_path, route.poses)
-        if not len(self._near(route, centre, bound)) and not len(left_out):
-            return []
-        bound, before = self._tightened(route, centre, loops)
-        if not len(self._near(route, centre, bound)) and not len(left_out):
-            return []
-        sigma = self._computed(route, centre, before, loops)
-        near = np.union1d(self._near(route, centre, sigma), left_out).astype(np.int64)
-        if not len(near):
-            return []
+        for sigma in self._uncertainties(route, centre, loops):
+            near = np.union1d(self._near(route, centre, sigma), left_out).astype(np.int64)
+            if not len(near):
+                return []
         self._searched = route.paths[centre]
         place = self._search(route, centre, near, sigma)
         if place is None:
@@ -108,37 +102,36 @@ class LoopDetector:
 
         Arguments as for close. A match that started near enough, or closes no loop, is not doubted.
         """
-        poses = route.poses
         tie = local_match.tie(int(route.rows[centre]))
         if tie is None:
             return None
         old = int(np.searchsorted(route.rows, tie[0]))
-        if not self._may_be_off(self._uncertainty.upper_bound(centre, self.tracked_path, poses), old):
-            return None
-        bound, before = self._tightened(route, centre, loops)
-        if not self._may_be_off(bound, old):
-            return None
-        sigma = self._computed(route, centre, before, loops)
-        if not self._may_be_off(sigma, old):
-            return None
+        for sigma in self._uncertainties(route, centre, loops):
+            if not self.options.sigmas * sigma.distance[old] > self.options.match_reach:
+                return None
         if is_lost(sigma, self.options)[old]:
             return LOST
         window, earlier = self._visit(route, centre, old, sigma)
-        pose = compose(poses[old], tie[1])
+        pose = compose(route.poses[old], tie[1])
         joint = None if local_match.nscan is None else self.nscan
         return why_match_doubted(route, centre, pose, earlier, window, self.options, joint)
 
-    def _tightened(self, route: Route, centre: int, loops: Loops) -> tuple[RelativeSigma, Indices]:
-        """An upper bound by the most certain paths, and the keyframe (K,) before each on its path."""
+    def _uncertainties(self, route: Route, centre: int, loops: Loops) -> Iterator[RelativeSigma]:
+        """Upper bounds by the tracked path and by the most certain paths, then what the graph says.
+
+        Each takes far longer than the one before.
+        """
+        yield self._uncertainty.upper_bound(centre, self.tracked_path, route.poses)
         links = self._links.links(route, self.tracked_path, loops())
         covariances, before = most_certain_paths(links, route.poses, centre, self.options.lever_arm)
-        return self._uncertainty.tighten(centre, covariances), before
+        yield self._uncertainty.tighten(centre, covariances)
+        yield self._computed(route, centre, before, loops)
 
     def _computed(self, route: Route, centre: int, before: Indices, loops: Loops) -> RelativeSigma:
         """The uncertainty by the graph of the tracked path and all loops.
 
         Of a large graph, only the part nearest to the centre counts, and the paths to all keyframes that may
-        be searched.
+        be searched. `before` (K,) is the keyframe before each on its most certain path.
         """
         part = Subgraph([*self.tracked_path.relations, *loops()])
         if len(route.rows) > self.options.max_exact_keyframes:
@@ -149,10 +142,6 @@ class LoopDetector:
             )
         energy = self.energies.of(route, part.relations, centre, part.free)
         return self._uncertainty.compute(energy, route.poses)
-
-    def _may_be_off(self, sigma: RelativeSigma, keyframe: int) -> bool:
-        """Whether a keyframe may be too far off for a joint match."""
-        return bool(self.options.sigmas * sigma.distance[keyframe] > self.options.match_reach)
 
     def refused(self) -> list[Loop]:
         """The verdicts on places that were not accepted."""

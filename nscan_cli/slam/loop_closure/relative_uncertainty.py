@@ -124,12 +124,8 @@ class RelativeUncertainty:
     def tighten(self, origin: int, covariances: Array) -> RelativeSigma:
         """Lower the last upper bound, of `origin`, by covariances (K, 3, 3), each of which is an upper bound
         itself."""
-        sigma = _sigma_of(covariances)
-        distance = np.minimum(self._sigma.distance, sigma.distance)
-        self._origin, self._sigma = (
-            origin,
-            RelativeSigma(distance, np.minimum(self._sigma.angle, sigma.angle)),
-        )
+        self._origin = origin
+        self._sigma = RelativeSigma(*np.minimum(self._sigma, _sigma_of(covariances)))
         return self._sigma
 
     def upper_bound(self, origin: int, path: TrackedPath, poses: Array) -> RelativeSigma:
