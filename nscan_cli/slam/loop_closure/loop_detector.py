@@ -26,16 +26,10 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths, relations_on_paths
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
-from nscan_cli.slam.loop_closure.place_search import find_place
+from nscan_cli.slam.loop_closure.place_search import find_place, why_match_doubted
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty
 from nscan_cli.slam.loop_closure.slip_evidence import SlipEvidence
-from nscan_cli.slam.loop_closure.verification import (
-    LOST,
-    is_lost,
-    places_agree,
-    why_match_doubted,
-    why_too_few,
-)
+from nscan_cli.slam.loop_closure.verification import LOST, is_lost, places_agree, why_too_few
 
 Loops = Callable[[], list[Relation]]
 

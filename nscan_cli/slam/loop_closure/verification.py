@@ -1,4 +1,4 @@
-"""Verification of loops: tests for a place that a search found, and for the loop of a joint match.
+"""Verification of loops: tests for a place that a search found.
 
 No other place may fit nearly as well, the scans of both visits must match from there, and enough keyframes
 must find the same place. A wrong loop is worse than a missed one.
@@ -12,16 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.graph.model import Loop
-from nscan_cli.matching.correlative_search import FoundPose, Search, SearchOptions, search
-from nscan_cli.poses import Array, Indices, Mask, compose, relative, wrap
+from nscan_cli.matching.correlative_search import FoundPose, Search
+from nscan_cli.poses import Indices, Mask, compose, relative, wrap
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, match_at, visit_moved
+from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, visit_moved
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma
-from nscan_cli.slam.loop_closure.search_submaps import search_submaps
 
 AMBIGUOUS = "another place fits as well"
 OUTDONE = "another place fits better"
@@ -80,42 +79,6 @@ def stretches(options: NScanOptions, closing: LoopClosureOptions) -> NScanOption
         max_scans=closing.stretch_scans,
         min_overlap=closing.stretch_overlap,
     )
-
-
-def why_match_doubted(
-    route: Route,
-    centre: int,
-    pose: Array,
-    earlier: Indices,
-    window: SearchOptions,
-    closing: LoopClosureOptions,
-    nscan: NScanOptions | None,
-) -> str | None:
-    """Why keyframe `centre` may lie elsewhere among the `earlier` ones (m,) than at `pose` (3,), or None.
-
-    A joint match ends at the nearest optimum; along a corridor there is one at every door. If the search
-    finds another place that fits about as well, a joint match from there, of the same scans, decides by the
-    energy of both, which is exact to the centimetre. Without `nscan`, for single matches, the search decides.
-    """
-    sought = search_submaps(route, centre, earlier, window, closing)
-    if sought is None:
-        return TOO_LITTLE
-    scan, field = sought
-    cells = replace(window, distance=2 * window.cell, turn=closing.agreement_turn)
-    here = search(field, scan, pose, closing.min_score, cells)
-    if here is None:
-        return TOO_LITTLE
-    about = Search(field, scan, route.poses[centre], window)
-    if about.best(here.score / closing.rival_score) is not None:
-        return OUTDONE
-    if nscan is None:
-        return None
-    other = about.best(closing.rival_score * here.score, without=(pose, closing.agreement_distance))
-    if other is None:
-        return None
-    (energy, _), (other_energy, there) = match_at(route, centre, (pose, other.pose), nscan)
-    is_elsewhere = np.hypot(*(there - pose)[:2]) > closing.agreement_distance
-    return OUTDONE if is_elsewhere and other_energy < energy else None
 
 
 def places_agree(one: Place, other: Place, route: Route, options: LoopClosureOptions) -> bool:

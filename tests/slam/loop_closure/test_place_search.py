@@ -17,14 +17,8 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
-from nscan_cli.slam.loop_closure.place_search import find_place
-from nscan_cli.slam.loop_closure.verification import (
-    AMBIGUOUS,
-    ELSEWHERE,
-    NO_MATCH,
-    OUTDONE,
-    why_match_doubted,
-)
+from nscan_cli.slam.loop_closure.place_search import find_place, why_match_doubted
+from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, ELSEWHERE, NO_MATCH, OUTDONE
 from tests.slam.keyframe_drives import (
     CABINETS,
     ROWS,
