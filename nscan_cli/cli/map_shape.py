@@ -120,7 +120,7 @@ def shaped_map(
     grid = occupancy_grid(log, rows, graph.poses[nodes], resolution)
     turn = removed = None
     if shape.align:
-        from nscan_cli.graph.turned_graph import turned_graph
+        from nscan_cli.graph.model import turned_graph
         from nscan_cli.mapping.wall_alignment import wall_alignment
 
         turn = wall_alignment(grid)
@@ -133,7 +133,7 @@ def shaped_map(
         removed = cells.counts()
         if shape.removed is not None:
             from nscan_cli.mapping.figures.canvas import figure_png
-            from nscan_cli.mapping.figures.removed_plot import plot_removed
+            from nscan_cli.mapping.figures.map_plots import plot_removed
 
             write_atomically(shape.removed, figure_png(plot_removed(grid, cells).image()))
     if shape.crop is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.nscan import NScan
 from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
-from nscan_cli.poses import Array, Indices, are_known, compose, relative
+from nscan_cli.poses import Array, Indices, are_known, compose, relative, rotated_information
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
@@ -98,3 +98,13 @@ class Graph:
         anchors = self.anchors[attached]
         moved[attached] = compose(moved[anchors], relative(self.poses[attached], self.poses[anchors]))
         self.poses = moved
+
+
+def turned_graph(graph: Graph, turn: float) -> Graph:
+    """The graph turned by an angle (rad) about the origin. Its relations are relative and stay."""
+    frame = np.array([0.0, 0.0, turn])
+    return replace(
+        graph,
+        poses=compose(np.broadcast_to(frame, graph.poses.shape), graph.poses),
+        marginals={node: rotated_information(frame, cov) for node, cov in graph.marginals.items()},
+    )

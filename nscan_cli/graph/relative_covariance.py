@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.graph_information import component_information
 from nscan_cli.graph.linalg.block_cholesky import solve, undetermined_nodes
+from nscan_cli.graph.marginal_covariances import component_information
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians

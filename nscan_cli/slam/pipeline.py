@@ -14,7 +14,7 @@ from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours

@@ -14,8 +14,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
-from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
-from nscan_cli.slam.frontend.odometry_restarts import restarts_of
+from nscan_cli.slam.frontend.odometry_checks import frozen_scans, restarts_of, without_jumps
 from nscan_cli.slam.frontend.odometry_stalls import without_stalls
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes

@@ -11,7 +11,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
-from nscan_cli.graph.turned_graph import turned_graph
+from nscan_cli.graph.model import turned_graph
 from tests.cli.test_render import POSES, graph_of, log_text, picture, room
 from tests.graph.small_graph import read_tum
 from tests.mapping.nav2 import load_map

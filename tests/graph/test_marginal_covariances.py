@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.graph.graph_information import component_information
 from nscan_cli.graph.io.load_graph import load_graph
-from nscan_cli.graph.marginal_covariances import marginal_covariances
+from nscan_cli.graph.marginal_covariances import component_information, marginal_covariances
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.poses import compose, relative, rotated_information, wrap

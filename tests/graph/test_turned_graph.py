@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.marginal_covariances import marginal_covariances
-from nscan_cli.graph.turned_graph import turned_graph
+from nscan_cli.graph.model import turned_graph
 from nscan_cli.poses import relative
 from tests.graph.small_graph import small_graph
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.mapping.cleaning import Removed
 from nscan_cli.mapping.figures.axes import (
     AXES_MARGINS,
     SCALE_BAR_MARGINS,
@@ -19,7 +20,7 @@ from nscan_cli.mapping.figures.axes import (
     draw_legend_below,
     draw_scale_bar,
 )
-from nscan_cli.mapping.figures.canvas import BLACK, BLUE, PURPLE, SKY, Bounds, Canvas
+from nscan_cli.mapping.figures.canvas import BLACK, BLUE, PURPLE, SKY, VERMILLION, Bounds, Canvas
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
@@ -165,3 +166,19 @@ def _points_of_occupied_cells(log: LaserLog, rows: Indices, poses: Array, grid: 
     points, columns, lines = points[inside], columns[inside], lines[inside]
     occupied: Array = points[grid.states()[lines, columns] == OCCUPIED]
     return occupied
+
+
+KINDS = (("unconnected", SKY, "not connected"), ("specks", VERMILLION, "specks"), ("gone", PURPLE, "gone"))
+
+
+def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:
+    """The cleaned map in soft grays, with the removed cells in colour; a scale bar and a legend below."""
+    background, cells_per_pixel = background_image(grid)
+    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
+    entries: list[LegendEntry] = []
+    for name, colour, text in KINDS:
+        cells = getattr(removed, name)
+        canvas.cloud(points_of_cells(cells, grid, max(1, round(1 / cells_per_pixel))), colour, 1.0)
+        entries.append(("disc", colour, f"{text}: {np.count_nonzero(cells)} cells"))
+    draw_scale_bar(canvas, entries)
+    return canvas

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.poses import relative, transform
 from nscan_cli.slam.frontend.break_options import BreakOptions
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.frontend.view_similarity import view_similarity
 
 

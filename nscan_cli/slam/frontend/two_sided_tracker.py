@@ -18,8 +18,7 @@ from nscan_cli.slam.frontend.motion_from_behind import (
 )
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 
 

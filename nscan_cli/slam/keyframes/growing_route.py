@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.poses import relative
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import chain_relations, extended, route_of
 from nscan_cli.slam.state import SlamState

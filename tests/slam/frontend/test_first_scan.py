@@ -10,10 +10,9 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.frontend.break_options import BreakOptions
-from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import TrackingOptions
-from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, place_first
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.scenes import office
 from tests.slam.keyframe_drives import round_scene

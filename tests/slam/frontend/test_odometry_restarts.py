@@ -9,8 +9,7 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.slam.frontend.break_options import BreakOptions
-from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions, without_jumps
-from nscan_cli.slam.frontend.odometry_restarts import restarts_of
+from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions, restarts_of, without_jumps
 from tests.simulation import faults
 from tests.slam.keyframe_drives import round_scene
 

@@ -14,7 +14,7 @@ from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
-from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.data import data_file
 from tests.logs.excerpts import excerpt

@@ -8,7 +8,7 @@ from PIL import Image
 
 from nscan_cli.mapping.figures.map_plots import SOFT_GRAYS
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, grid_of_counts
-from nscan_cli.mapping.viewer.map_picture import map_picture
+from nscan_cli.mapping.viewer.viewer_page import map_picture
 
 
 @pytest.fixture
