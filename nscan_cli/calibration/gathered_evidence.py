@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps, no_steps
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
@@ -49,10 +49,11 @@ def _growing(
     log: LaserLog, odometry: Array, count: int, parts: int, options: FileCheckOptions, known: KnownSteps
 ) -> Iterator[StepEvidence]:
     """The evidence of one of the parts of a sample of `count` steps, of two of them, and so on."""
-    steps, (first, last) = no_steps(), telling_steps(log, options.steps, count)
+    steps, (first, last) = None, telling_steps(log, options.steps, count)
     for part in range(parts):
         some = slice(part, None, parts)
-        steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps, known=known))
+        more = measure_steps(log, (first[some], last[some]), options.steps, known=known)
+        steps = more if steps is None else steps.with_others(more)
         yield StepEvidence(odometry, steps, options)
 
 

@@ -13,7 +13,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.correlative_search import likelihood_field, search
 from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.matching.uncertainty import covariance_of, why_no_minimum
-from nscan_cli.poses import Array, Indices, relative
+from nscan_cli.poses import Array, Indices, Mask, relative
 
 KnownSteps = dict[tuple[int, int], tuple[Array, Array] | None]
 """The pose (3,) and its covariance (3, 3) of steps from a row to another; None of those in doubt."""
@@ -39,21 +39,30 @@ class MeasuredSteps:
         """(n, 3) these steps of the robot by odometry, from the `poses` (S, 3) of all scans."""
         return relative(poses[self.last], poses[self.first])
 
+    def of(self, steps: Indices | Mask) -> MeasuredSteps:
+        """Some of these steps."""
+        return MeasuredSteps(*(column[steps] for column in vars(self).values()))
+
     def with_others(self, others: MeasuredSteps) -> MeasuredSteps:
         """These and other steps, in order of their first rows."""
-        order = np.argsort(np.concatenate([self.first, others.first]), kind="stable")
-        return MeasuredSteps(
-            np.concatenate([self.first, others.first])[order],
-            np.concatenate([self.last, others.last])[order],
-            np.concatenate([self.laser, others.laser])[order],
-            np.concatenate([self.covariances, others.covariances])[order],
-        )
+        columns = zip(vars(self).values(), vars(others).values(), strict=True)
+        together = MeasuredSteps(*map(np.concatenate, columns))
+        return together.of(np.argsort(together.first, kind="stable"))
 
+    def chains(self, longest: int) -> Indices:
+        """The first steps (c,) of chains of up to `longest` steps, each of which begins where the one before
+        ends.
 
-def no_steps() -> MeasuredSteps:
-    """None at all."""
-    rows = np.zeros(0, dtype=np.int64)
-    return MeasuredSteps(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, 3)))
+        Added up over a chain, errors of the stamps matter less. If stamps are now too late and now too early,
+        the turn of a short step is compared with odometry of another time. The two then agree less, and the
+        fitted ratio comes out too small.
+        """
+        follows = np.append(False, self.first[1:] == self.last[:-1])
+        begins: list[int] = []
+        for at, is_next in enumerate(follows.tolist()):
+            if not begins or not is_next or at - begins[-1] >= longest:
+                begins.append(at)
+        return np.array(begins, dtype=np.int64)
 
 
 def measure_steps(

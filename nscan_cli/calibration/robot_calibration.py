@@ -17,7 +17,6 @@ from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, fit_mount
 from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
-from nscan_cli.calibration.step_chains import chains
 from nscan_cli.calibration.step_sampling import successive_steps
 from nscan_cli.calibration.sweep_calibration import calibrated_sweep
 from nscan_cli.calibration.wheels import sideways_share, wheels
@@ -112,7 +111,14 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
             ),
             **drive.noise(offset.value, fit, ratio.value, veer.value, mirrored),
         },
-        drive.evidence(len(rows[0]), sweep.pairs),
+        CalibrationEvidence(
+            len(rows[0]),
+            len(drive.laser),
+            int(drive.turning.sum()),
+            float(drive.length.sum()),
+            float(np.abs(drive.laser[:, 2]).sum()),
+            sweep.pairs,
+        ),
         sweep.seconds,
         sweep.stamp(reading.stamp, offset),
     )
@@ -141,20 +147,12 @@ class _Drive:
         self._at, self._poses = log.times[known], log.odometry[known].copy()
         self._poses[:, 2] = np.unwrap(self._poses[:, 2])
         has_odometry = known[steps.first] & known[steps.last]
-        self.steps = MeasuredSteps(
-            steps.first[has_odometry], steps.last[has_odometry],
-            steps.laser[has_odometry], steps.covariances[has_odometry],
-        )  # fmt: skip
+        self.steps = steps.of(has_odometry)
         self.laser = self.steps.laser
         self._begins, self._ends = log.times[self.steps.first], log.times[self.steps.last]
         length, least = np.hypot(self.laser[:, 0], self.laser[:, 1]), options.steps.min_motion
         self.length, self.turning = length, np.abs(self.laser[:, 2]) >= least
         self.moving = (length >= least) | self.turning
-
-    @property
-    def turns_enough(self) -> bool:
-        """Whether there are steps with a turn enough."""
-        return bool(self.turning.sum() >= self.options.min_turns)
 
     def odometry(self, offset: float) -> Array:
         """(n, 3) the steps by odometry whose clock is shifted by an offset (s)."""
@@ -171,7 +169,7 @@ class _Drive:
 
     def clock(self) -> tuple[Estimate, bool, str]:
         """The offset of the clocks, s; whether readings are mirrored; why turns do not tell, or nothing."""
-        if not self.turns_enough:
+        if self.turning.sum() < self.options.min_turns:
             return left_open(0.0, 0.0, HARDLY_TURNS), False, HARDLY_TURNS
         options, gain = self.options.clock, self.options.clock.gain
         plain, other = (clock_offset(self.log, self.steps, options, sign) for sign in (1.0, -1.0))
@@ -215,7 +213,7 @@ class _Drive:
         """
         if why_open:
             return left_open(1.0, 1.0, why_open), left_open(0.0, 0.0, why_open)
-        begins = chains(self.steps, self.options.steps.chain)
+        begins = self.steps.chains(self.options.steps.chain)
         told = self.odometry(offset)
         columns = self.laser[:, 2] * (-1.0 if mirrored else 1.0), _forward(told, scale), told[:, 2]
         turned, driven, by_odometry = (np.add.reduceat(column, begins) for column in columns)
@@ -230,7 +228,7 @@ class _Drive:
     def mount_fit(self, offset: float, mirrored: bool) -> MountFit | None:
         laser, told = self.laser[self.moving] * (MIRRORED if mirrored else 1.0), self.odometry(offset)
         group = np.searchsorted(
-            chains(self.steps, self.options.dependent_steps), np.flatnonzero(self.moving), side="right"
+            self.steps.chains(self.options.dependent_steps), np.flatnonzero(self.moving), side="right"
         )
         groups = np.flatnonzero(np.diff(group, prepend=0))
         return fit_mount(laser, told[self.moving], self.options.steps.metres_per_radian, groups)
@@ -255,16 +253,6 @@ class _Drive:
             "noise_distance": _noise(along, came[far], float(by_match[0])),
             "noise_turn": _noise(about, np.abs(turns[self.turning]), float(by_match[1])),
         }
-
-    def evidence(self, sampled: int, pairs: int) -> CalibrationEvidence:
-        return CalibrationEvidence(
-            sampled,
-            len(self.laser),
-            int(self.turning.sum()),
-            float(self.length.sum()),
-            float(np.abs(self.laser[:, 2]).sum()),
-            pairs,
-        )
 
 
 def _forward(odometry: Array, scale: float) -> Array:
