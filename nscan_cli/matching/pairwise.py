@@ -10,7 +10,6 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.motion_model import Prior, no_prior
 from nscan_cli.matching.pairwise_solver import (
-    PairDescent,
     PairProblem,
     minimise_pairwise,
     pairwise_objective,
@@ -137,7 +136,10 @@ def match_pair(
     Minimises scale · E plus the prior (14) stage by stage. E jumps where points cross the borders of cells,
     so the gradient at a minimum need not be zero. `decrement` tells the step that is left.
     """
-    problem, pose, found = _minimum(reference, points, start, prior, options)
+    association = begin_association(points)
+    problem = PairProblem(reference.grid, reference.half, association, options.scale, prior or no_prior())
+    pose, limits = start.copy(), (options.max_iterations, options.coarse_tolerance, options.tolerance)
+    found = minimise_pairwise(problem, pose, np.array(options.widenings), *limits, np.empty((3, 3)))
     hessian, gradient, out = np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
     pairwise_objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
@@ -163,14 +165,3 @@ def match_pair(
         unsettled=found.unsettled,
         reason=reason,
     )
-
-
-def _minimum(
-    reference: Ndt, points: Array, start: Array, prior: Prior | None, options: PairOptions
-) -> tuple[PairProblem, Array, PairDescent]:
-    """The problem of a match, the pose (3,) of its minimum with any angle, and how it was found."""
-    association = begin_association(points)
-    problem = PairProblem(reference.grid, reference.half, association, options.scale, prior or no_prior())
-    pose, limits = start.copy(), (options.max_iterations, options.coarse_tolerance, options.tolerance)
-    found = minimise_pairwise(problem, pose, np.array(options.widenings), *limits, np.empty((3, 3)))
-    return problem, pose, found

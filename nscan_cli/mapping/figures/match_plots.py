@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.files.text import counted
 from nscan_cli.mapping.figures.axes import LegendEntry, draw_title_and_legend
-from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Bounds, Canvas, Colour
+from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Canvas, Colour
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.panels import (
@@ -98,7 +98,8 @@ def plot_nscan(
     ]
     shown = np.concatenate([*both, start[kept, :2], poses[:, :2]])
     gone = start[[out.scan for out in left_out], :2]
-    near = _in_bounds(gone, bounds_around(shown, 1.0, VIEW_MARGIN))
+    view = bounds_around(shown, 1.0, VIEW_MARGIN)
+    near: Mask = np.all((gone >= view[:2]) & (gone <= view[2:]), axis=1)
     bounds = bounds_around(np.concatenate([shown, gone[near]]), MIN_ASPECT)
     before, after = stacked_panels(bounds)
     for out in left_out:
@@ -119,12 +120,6 @@ def plot_nscan(
         after, f"after: {len(kept)} scans, least overlap {match.overlap.min():.0%}, {outcome}", order
     )
     return stack_images([before.image(), after.image()])
-
-
-def _in_bounds(points: Array, bounds: Bounds) -> Mask:
-    """(N,) whether each of the points (N, 2) lies within the bounds."""
-    inside: Mask = np.all((points >= bounds[:2]) & (points <= bounds[2:]), axis=1)
-    return inside
 
 
 def scan_legend(names: Sequence[str]) -> list[LegendEntry]:

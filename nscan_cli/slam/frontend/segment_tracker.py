@@ -82,11 +82,11 @@ class SegmentTracker:
         """Searches for a lost scan."""
         return self._searches + self.tracker.searches
 
-    def follow(self, scans: ScanBatch) -> list[TrackedBatch]:
-        """Track the next scans; returns those, in order, that are settled by it: not those still doubted."""
-        return self._follow(scans, may_wait=True)
+    def follow(self, scans: ScanBatch, may_wait: bool = True) -> list[TrackedBatch]:
+        """Track the next scans; returns those, in order, that are settled by it: not those still doubted.
 
-    def _follow(self, scans: ScanBatch, may_wait: bool) -> list[TrackedBatch]:
+        The last ones may wait for scans after them.
+        """
         settled: list[TrackedBatch] = []
         ahead = self._track(scans, may_wait)
         while ahead:
@@ -109,7 +109,7 @@ class SegmentTracker:
         """The last scans, which nothing settles any more. Nothing can be tracked after them."""
         settled: list[TrackedBatch] = []
         if self._unmatched:
-            settled += self._follow(self._unmatched.pop(), may_wait=False)
+            settled += self.follow(self._unmatched.pop(), may_wait=False)
         settled += self._settle_doubted() + self._place_first()
         self._restarts, self._searches = self.restarts, self.searches
         # The local map is large, and of no use any more.

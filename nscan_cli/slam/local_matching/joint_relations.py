@@ -11,7 +11,7 @@ from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint.ambiguity import with_ambiguity
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
-from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
+from nscan_cli.matching.joint.joint_match import match_jointly
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import connected_at, connectivity
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
@@ -72,9 +72,7 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
     if len(near.members) < options.min_scans:
         return None
     for widenings in options.attempts:
-        local_match, is_enough = _match_held(
-            route, near.members, near.from_other_visit, centre, widenings, options
-        )
+        local_match, is_enough = _match_held(route, near, centre, widenings, options)
         if is_enough and local_match.moved < options.max_last_stage_motion:
             break
     return local_match
@@ -117,19 +115,14 @@ def match_at(
 
 
 def _match_held(
-    route: Route,
-    members: Indices,
-    from_other_visit: Mask,
-    centre: int,
-    widenings: tuple[float, ...],
-    options: NScanOptions,
+    route: Route, near: Neighbours, centre: int, widenings: tuple[float, ...], options: NScanOptions
 ) -> tuple[LocalMatch, bool]:
     """Match jointly, leave out scans without enough overlap, and match again, until all match.
 
     Also returns whether further stages cannot add scans: the match converged, and all scans took part at
     first. Scans that are left out later hardly ever come back.
     """
-    keyframes, poses = route.keyframes, route.poses
+    keyframes, poses, (members, from_other_visit, _) = route.keyframes, route.poses, near
     kept, start, scans = np.arange(len(members)), poses[members], _laid_out(keyframes, members)
     if len(widenings) == 1:
         held = connected_at(
@@ -157,8 +150,17 @@ def _match_held(
             loop = verdict(keyframes, members, from_other_visit, centre, False, "did not converge", score)
             return LocalMatch((), None, loop, 0.0, False, frozenset(related.tolist())), False
         closed = bool(from_other_visit[kept].any())
-        origin = "loop" if closed else "nscan"
-        relation = _relation(route.rows[related], at, problem, match, origin, score, options)
+        # What is left of negative curvature at the optimum is rounding, or a cell's border.
+        eigenvalues, vectors = np.linalg.eigh(match.hessian)
+        definite = (vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T
+        relation = NScan(
+            nodes=tuple(route.rows[related].tolist()),
+            poses=match.poses,
+            hessian=with_ambiguity(problem, match.poses, definite, options.ambiguity),
+            fixed=at,
+            origin="loop" if closed else "nscan",
+            score=score,
+        )
         whole = len(kept) == len(members)
         reason = "" if whole else f"{counted(len(members) - len(kept), 'scan')} left out"
         used, before = (related, from_other_visit[kept]) if closed else (members, from_other_visit)
@@ -208,28 +210,6 @@ def _stages(widenings: tuple[float, ...], options: NScanOptions, one_visit: bool
 def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
     """The factor that makes the energy of some keyframes' scans a negative log likelihood."""
     return options.scale_per_cell / points_per_cell(keyframes)
-
-
-def _relation(
-    nodes: Indices,
-    fixed: int,
-    problem: JointProblem,
-    match: JointMatch,
-    origin: str,
-    score: float,
-    options: NScanOptions,
-) -> NScan:
-    eigenvalues, vectors = np.linalg.eigh(match.hessian)
-    # What is left of negative curvature at the optimum is rounding, or a cell's border.
-    definite = (vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T
-    return NScan(
-        nodes=tuple(nodes.tolist()),
-        poses=match.poses,
-        hessian=with_ambiguity(problem, match.poses, definite, options.ambiguity),
-        fixed=fixed,
-        origin=origin,
-        score=score,
-    )
 
 
 def verdict(

@@ -60,7 +60,13 @@ def match_neighbours_pairwise(
     overlaps = np.array([single.overlap for single in singles])
     kept = overlaps >= options.min_overlap
     relations = tuple(
-        _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
+        Pairwise(
+            nodes=(keyframes[other].row, keyframes[centre].row),
+            measurement=single.pose,
+            information=single.information,
+            origin="loop" if seen else "track",
+            score=single.overlap,
+        )
         for other, seen, single, keep in zip(others, from_other_visit, singles, kept, strict=True)
         if keep
     )
@@ -118,13 +124,3 @@ def _overlap(other: Keyframe, centre: Keyframe, pose: Array, inlier_bound: float
     on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, inlier_bound)
     on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), inlier_bound)
     return max(on_other, on_centre)
-
-
-def _relation(other: Keyframe, centre: Keyframe, single: _Single, origin: str) -> Pairwise:
-    return Pairwise(
-        nodes=(other.row, centre.row),
-        measurement=single.pose,
-        information=single.information,
-        origin=origin,
-        score=single.overlap,
-    )
