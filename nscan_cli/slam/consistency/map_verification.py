@@ -89,10 +89,11 @@ def verify(state: SlamState, graph: Graph, options: VerificationOptions, threads
     runs = repeats(log)
     paths = map_in_threads(threads, lambda run: run(log, slam), runs.values())
     found = [path_differences(path, again, options) for again in paths]
-    sigmas = _RelativeSigmas(graph, [each for some in found for each in some])
+    ends = [row for some in found for each in some for row in (each.first, each.last)]
+    known = RelativePoses(graph, np.unique(graph.anchors[ends]).tolist())
     return Verification(
         [
-            Repeat(name, again, [replace(each, sigma=sigmas.of(each)) for each in some])
+            Repeat(name, again, [replace(each, sigma=_sigma(graph, known, each)) for each in some])
             for name, again, some in zip(runs, paths, found, strict=True)
         ],
         options,
@@ -109,21 +110,14 @@ def add_verification(state: SlamState, graph: Graph, options: VerificationOption
         provenance["notices"].append(notice)
 
 
-class _RelativeSigmas:
-    """What a graph says of the relative positions of the ends of some ways."""
-
-    def __init__(self, graph: Graph, differences: list[PathDifference]) -> None:
-        self._anchors = graph.anchors
-        rows = [row for each in differences for row in (each.first, each.last)]
-        self._relations = RelativePoses(graph, np.unique(graph.anchors[rows]).tolist())
-
-    def of(self, difference: PathDifference) -> float | None:
-        """Standard deviation (m) along the least certain direction, of the keyframes at its ends."""
-        a, b = self._anchors[[difference.first, difference.last]].tolist()
-        if a == b:
-            return 0.0
-        relation = self._relations.relation(a, b)
-        if relation is None:
-            return None
-        covariance = np.linalg.inv(relation.information)[:2, :2]
-        return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
+def _sigma(graph: Graph, known: RelativePoses, difference: PathDifference) -> float | None:
+    """What a graph says of a way: standard deviation (m) of the relative position of the keyframes at its
+    ends, along the least certain direction."""
+    a, b = graph.anchors[[difference.first, difference.last]].tolist()
+    if a == b:
+        return 0.0
+    relation = known.relation(a, b)
+    if relation is None:
+        return None
+    covariance = np.linalg.inv(relation.information)[:2, :2]
+    return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))

@@ -16,6 +16,8 @@ from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 
+WITHOUT_ODOMETRY = "without odometry"
+
 
 @dataclass(frozen=True)
 class MappedPath:
@@ -67,11 +69,6 @@ def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:
     return replace(found, poses=found.poses * MIRRORED)
 
 
-def path_without_odometry(log: LaserLog, options: SlamOptions) -> MappedPath:
-    """Map a log by its scans alone."""
-    return path_of(replace(log, odometry=None, odometry_path=None), options)
-
-
 def repeats(log: LaserLog) -> dict[str, Callable[[LaserLog, SlamOptions], MappedPath]]:
     """What to call the runs that have to give the same path, and how each is done."""
     runs: dict[str, Callable[[LaserLog, SlamOptions], MappedPath]] = {
@@ -80,8 +77,7 @@ def repeats(log: LaserLog) -> dict[str, Callable[[LaserLog, SlamOptions], Mapped
         "mirrored": path_of_mirrored,
     }
     if log.odometry is not None:
-        runs[WITHOUT_ODOMETRY] = path_without_odometry
+        runs[WITHOUT_ODOMETRY] = lambda log, options: path_of(
+            replace(log, odometry=None, odometry_path=None), options
+        )
     return runs
-
-
-WITHOUT_ODOMETRY = "without odometry"

@@ -57,21 +57,12 @@ def odometry_disagreements(
     change = np.zeros(len(rows) + 1, dtype=np.int64)
     np.add.at(change, wrong, 1)
     np.add.at(change, until[wrong], -1)
-    return [
-        OdometryDisagreement(int(rows[a]), int(rows[b]), *_lengths(tracks[:, _ends(until, a, b)]).tolist())
-        for a, b in mask_runs(np.cumsum(change) > 0)
-    ]
-
-
-def _ends(until: Indices, first: int, last: int) -> list[int]:
-    """The ends of the stretches that lead one after the other from the first keyframe to the last."""
-    ends = [first]
-    while ends[-1] < last:
-        ends.append(min(int(until[ends[-1]]), last))
-    return ends
-
-
-def _lengths(tracks: Array) -> Array:
-    """(2,) lengths of two paths (2, n, 2), straight from position to position, m."""
-    lengths: Array = np.linalg.norm(np.diff(tracks, axis=1), axis=2).sum(axis=1)
-    return lengths
+    found = []
+    for first, last in mask_runs(np.cumsum(change) > 0):
+        # Stretches that lead one after the other from the first keyframe to the last.
+        ends = [first]
+        while ends[-1] < last:
+            ends.append(min(int(until[ends[-1]]), last))
+        lengths = np.linalg.norm(np.diff(tracks[:, ends], axis=1), axis=2).sum(axis=1)
+        found.append(OdometryDisagreement(int(rows[first]), int(rows[last]), *lengths.tolist()))
+    return found
