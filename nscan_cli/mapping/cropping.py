@@ -26,9 +26,8 @@ class CroppingOptions:
     """Space around the rest, m. A larger value makes larger maps."""
 
 
-def automatic_box(grid: OccupancyGrid, path: Array, options: CroppingOptions | None = None) -> Box:
+def automatic_box(grid: OccupancyGrid, path: Array, options: CroppingOptions = CroppingOptions()) -> Box:
     """The box around nearly all hits of occupied cells, and around the path (N, 2)."""
-    options = options or CroppingOptions()
     hits = np.where(grid.states() == OCCUPIED, grid.hits, 0).astype(np.int64)
     (low_x, high_x), (low_y, high_y) = (
         _span(hits.sum(axis=axis), start, grid.resolution, options.outside)

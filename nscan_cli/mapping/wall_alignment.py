@@ -37,9 +37,8 @@ class WallAlignmentOptions:
     """Lines reach so many bins to both sides. A larger number is more exact, and takes longer."""
 
 
-def wall_alignment(grid: OccupancyGrid, options: WallAlignmentOptions | None = None) -> float:
+def wall_alignment(grid: OccupancyGrid, options: WallAlignmentOptions = WallAlignmentOptions()) -> float:
     """The turn about the map's origin, rad, from −45° to 45°; 0 for a map without occupied cells."""
-    options = options or WallAlignmentOptions()
     lines, columns = np.nonzero(grid.states() == OCCUPIED)
     if len(lines) == 0:
         return 0.0

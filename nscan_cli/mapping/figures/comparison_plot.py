@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.mapping.figures.axes import SCALE_BAR_MARGINS, draw_scale_bar
+from nscan_cli.mapping.figures.axes import draw_scale_bar
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION, Canvas
-from nscan_cli.mapping.figures.map_plots import background_image, points_of_cells
+from nscan_cli.mapping.figures.map_plots import draw_cells, map_canvas
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid, grid_of_counts
 from nscan_cli.poses import Array
 
@@ -45,10 +45,9 @@ def plot_comparison(first: DrawnResult, second: DrawnResult) -> Canvas:
     hits = np.where(agreed, 10, 0).astype(np.int32)
     corner = (left * size, bottom * size)
     both = grid_of_counts(hits, (free & ~agreed).astype(np.int32), size, corner)
-    background, cells_per_pixel = background_image(both)
-    canvas = Canvas(both.bounds, 1 / (cells_per_pixel * size), background, SCALE_BAR_MARGINS)
+    canvas = map_canvas(both)
     for drawn, cells, colour in ((first, alone[0], BLUE), (second, alone[1], VERMILLION)):
-        canvas.cloud(points_of_cells(cells, both, max(1, round(1 / cells_per_pixel))), colour, 1.0)
+        draw_cells(canvas, cells, both, colour)
         canvas.line(drawn.path, colour, 1.2)
     draw_scale_bar(canvas, [("line", BLUE, first.name), ("line", VERMILLION, second.name)])
     return canvas

@@ -20,7 +20,7 @@ from nscan_cli.mapping.figures.axes import (
     draw_legend_below,
     draw_scale_bar,
 )
-from nscan_cli.mapping.figures.canvas import BLACK, BLUE, PURPLE, SKY, VERMILLION, Bounds, Canvas
+from nscan_cli.mapping.figures.canvas import BLACK, BLUE, PURPLE, SKY, VERMILLION, Bounds, Canvas, Colour
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
@@ -55,8 +55,7 @@ class Overlays:
 
 def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
     """The map in soft grays with coloured overlays; a scale bar and a legend below."""
-    background, cells_per_pixel = background_image(grid)
-    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
+    canvas = map_canvas(grid)
     draw_scale_bar(canvas, _draw_overlays(canvas, graph, overlays))
     return canvas
 
@@ -106,7 +105,13 @@ def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Leg
     return entries
 
 
-def background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
+def map_canvas(grid: OccupancyGrid) -> Canvas:
+    """The map in soft grays, with a margin for a scale bar."""
+    background, cells_per_pixel = _background_image(grid)
+    return Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
+
+
+def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     """The map in soft grays (h, w), and the number of cells along the side of a pixel."""
     cells = gray_image(grid, SOFT_GRAYS)
     longest = max(cells.shape)
@@ -123,14 +128,15 @@ def background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
 
 
-def points_of_cells(cells: Mask, grid: OccupancyGrid, pixels: int) -> Array:
-    """(N, 2) a point in every pixel of the cells (H, W), m; a cell has `pixels` × `pixels`."""
+def draw_cells(canvas: Canvas, cells: Mask, grid: OccupancyGrid, colour: Colour) -> None:
+    """Colours cells (H, W) of the grid of a `map_canvas`, by a point in every pixel of them."""
+    pixels = max(1, round(canvas.pixels_per_metre * grid.resolution))
     lines, columns = np.nonzero(cells)
     aside = (np.arange(pixels) + 0.5) / pixels
     inner = np.stack(np.meshgrid(aside, aside), axis=-1).reshape(-1, 2)
     corners = np.column_stack([columns, lines])[:, None, :]
-    points: Array = (corners + inner).reshape(-1, 2) * grid.resolution + np.array(grid.origin)
-    return points
+    points = (corners + inner).reshape(-1, 2) * grid.resolution + np.array(grid.origin)
+    canvas.cloud(points, colour, 1.0)
 
 
 def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
@@ -173,12 +179,11 @@ KINDS = (("unconnected", SKY, "not connected"), ("specks", VERMILLION, "specks")
 
 def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:
     """The cleaned map in soft grays, with the removed cells in colour; a scale bar and a legend below."""
-    background, cells_per_pixel = background_image(grid)
-    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
+    canvas = map_canvas(grid)
     entries: list[LegendEntry] = []
     for name, colour, text in KINDS:
         cells = getattr(removed, name)
-        canvas.cloud(points_of_cells(cells, grid, max(1, round(1 / cells_per_pixel))), colour, 1.0)
+        draw_cells(canvas, cells, grid, colour)
         entries.append(("disc", colour, f"{text}: {np.count_nonzero(cells)} cells"))
     draw_scale_bar(canvas, entries)
     return canvas

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
-from nscan_cli.mapping.viewer.notice_places import notice_places
 from nscan_cli.poses import Array, Indices
 
 MAX_BEAMS = 4_000_000
@@ -26,6 +26,11 @@ RANGE_UNIT = 0.01
 """The step of ranges in a page, m."""
 COMPRESSION = 6
 """The level of zlib; a higher one takes three times as long, and makes the page smaller by 2 %."""
+Stretch = tuple[int, int]
+"""The first and the last node."""
+
+NAMED = re.compile(r"\bscans? (\d+(?:, \d+)*)(?: (?:to|and) (?:scan )?(\d+)(?! more))?")
+"""As in "scan 7", "scans 7, 12 and 3 more", "scans 7 to 12", "from scan 7 to scan 12"."""
 
 
 def viewer_data(
@@ -137,3 +142,18 @@ def _packed(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
     head += b" " * (-len(head) % 4)
     body = b"".join(array.tobytes().ljust(sizes[name], b"\0") for name, array in arrays.items())
     return gzip.compress(len(head).to_bytes(4, "little") + head + body, COMPRESSION, mtime=0)
+
+
+def notice_places(notice: str, scans: Indices) -> list[Stretch]:
+    """The stretches of nodes whose scan numbers (N,), increasing, a notice names.
+
+    A scan that the graph does not have is represented by the one that follows.
+    """
+    found: list[Stretch] = []
+    for match in NAMED.finditer(notice):
+        texts, is_stretch = [*match[1].split(", "), *filter(None, match.groups()[1:])], " to " in match[0]
+        nodes = [min(int(np.searchsorted(scans, int(text))), len(scans) - 1) for text in texts]
+        found += [(node, node) for node in (nodes[:-2] if is_stretch else nodes)]
+        if is_stretch:
+            found.append((nodes[-2], max(nodes[-2:])))
+    return found

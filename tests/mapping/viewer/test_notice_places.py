@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from nscan_cli.mapping.viewer.notice_places import notice_places
+from nscan_cli.mapping.viewer.viewer_data import notice_places
 
 SCANS = np.arange(0, 100, 2)
 """Of every second scan there is a node."""
