@@ -15,9 +15,8 @@ from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
-from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes, SlipDetector
 from nscan_cli.slam.keyframes.options import KeyframeOptions
-from nscan_cli.slam.keyframes.slip_detection import SlipDetector
 from tests.benchmarks.robustness import false_loops, mapped, undisturbed
 from tests.data import data_file
 from tests.ndt.wall_points import room
