@@ -175,7 +175,8 @@ def _place(
     log: LaserLog, evidence: StepEvidence, step: int, reading: ReadingOptions
 ) -> findings.PlaceOfChange:
     """The scans between which a step begins something else."""
-    before, behind = evidence.rows_at(step)
+    # Where the step before that one begins, and where that one ends.
+    before, behind = int(evidence.both.first[step - 1]), int(evidence.both.last[step])
     end, start = (log.times[[before, behind]] - log.times[0] + (reading.start or 0.0)).tolist()
     return findings.PlaceOfChange(int(log.numbers[before]), int(log.numbers[behind]), end, start)
 

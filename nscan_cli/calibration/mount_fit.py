@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.calibration.robust_fit import RobustFit, median, robust_fit
-from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -102,12 +102,6 @@ def fit_mount(
         tail / usual,
         len(laser),
     )
-
-
-def robot_lengths(laser: Array, mount: Array) -> Array:
-    """(n,) lengths of the robot's steps, m, by those of its laser (n, 3), which is mounted at (3,)."""
-    robot = relative(compose(compose(mount, laser), relative(np.zeros(3), mount)), np.zeros(3))
-    return np.hypot(robot[:, 0], robot[:, 1])
 
 
 def _covariance(fit: RobustFit, size: float) -> Array:

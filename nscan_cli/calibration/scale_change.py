@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.calibration.mount_fit import MountFit, robot_lengths
+from nscan_cli.calibration.mount_fit import MountFit
 from nscan_cli.calibration.odometry_options import ScaleChangeOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA, median
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, compose, inverse
 
 SIGMA_OF_MEDIAN = 1.2533
 """Standard deviation of the median of normal values, as a multiple of that of their mean."""
@@ -42,7 +42,8 @@ def scale_change(
     It is where two medians explain the logarithms of scales with the least absolute residuals.
     `fit` is the mounting that explains the steps.
     """
-    by_scans, by_odometry = robot_lengths(laser, fit.mount), np.hypot(odometry[:, 0], odometry[:, 1])
+    robot = compose(compose(fit.mount, laser), inverse(fit.mount))
+    by_scans, by_odometry = (np.hypot(steps[:, 0], steps[:, 1]) for steps in (robot, odometry))
     # Along bare walls scans tell hardly any length, and too short ones.
     is_told = (by_scans >= options.min_length) & (sigmas <= options.max_sigma * by_scans)
     told: Indices = np.flatnonzero(is_told & (by_odometry > 0.0))

@@ -22,8 +22,9 @@ class StepEvidence:
         """`odometry` (S, 3) are the poses of all scans."""
         by_odometry = steps.odometry(odometry)
         self.steps, self.options, self.poses = steps, options, odometry
-        self._known = are_known(by_odometry)
-        self.laser, self.odometry = steps.laser[self._known], by_odometry[self._known]
+        known = are_known(by_odometry)
+        self.both, self.odometry = steps.of(known), by_odometry[known]
+        self.laser = self.both.laser
         least = options.steps.min_motion
         self._is_turning = np.abs(self.laser[:, 2]) >= least
         self._is_moving = _moves(self.laser, least)
@@ -110,7 +111,7 @@ class StepEvidence:
         """The clearest change of scale along the steps."""
         if self.fit is None:
             return None
-        sigmas = _length_sigmas(self.laser, self.steps.covariances[self._known])
+        sigmas = _length_sigmas(self.laser, self.both.covariances)
         return scale_change(self.laser, self.odometry, sigmas, self.fit, self.options.change)
 
     def turn_change(self, least: int) -> TurnChange | None:
@@ -121,11 +122,6 @@ class StepEvidence:
         """The clearest change of the direction of a laser, mounted at (3,), with so many steps on both
         sides."""
         return direction_change(self.laser, self.odometry, mount, least, self.options.view)
-
-    def rows_at(self, step: int) -> tuple[int, int]:
-        """The rows where the step before one of those that have both begins, and where this one ends."""
-        known = np.flatnonzero(self._known)
-        return int(self.steps.first[known[step - 1]]), int(self.steps.last[known[step]])
 
     def fit_without(self, change: ScaleChange) -> MountFit | None:
         """The fit of odometry whose scale does not change."""
@@ -141,7 +137,7 @@ class StepEvidence:
 
     def fit_with_signs(self, signs: Array) -> MountFit | None:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
-        return self._fit(self.laser, self.steps.odometry(self.poses * signs)[self._known])
+        return self._fit(self.laser, self.both.odometry(self.poses * signs))
 
     def _fit(self, laser: Array, odometry: Array, is_in_middle: bool = False) -> MountFit | None:
         moving, arm = self._is_moving, self.options.steps.metres_per_radian
