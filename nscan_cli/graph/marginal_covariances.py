@@ -71,8 +71,5 @@ def marginal_covariances(graph: Graph) -> dict[int, Array]:
     _, factor = component_information(graph, part)
     covariances = inverse_diagonal(factor)
     undetermined = undetermined_nodes(factor)
-    marginals = {first: np.zeros((3, 3))}
-    for keyframe, covariance, is_open in zip(others.tolist(), covariances, undetermined, strict=True):
-        if not is_open:
-            marginals[keyframe] = covariance
-    return marginals
+    known = zip(others[~undetermined].tolist(), covariances[~undetermined], strict=True)
+    return {first: np.zeros((3, 3)), **dict(known)}

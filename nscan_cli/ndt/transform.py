@@ -157,11 +157,8 @@ def grid_settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> 
     # One by one, which is faster than many places at a time: many grids are for one match of two scans.
     settings, walls = np.empty(13), options.walls
     settings[MINIMUM], settings[FLOOR] = options.minimum, options.floor
-    settings[NEIGHBOURHOOD], settings[FACES], settings[LEAST_RATIO] = (
-        neighbourhood,
-        faces,
-        options.least_ratio,
-    )
+    settings[NEIGHBOURHOOD], settings[FACES] = neighbourhood, faces
+    settings[LEAST_RATIO] = options.least_ratio
     settings[MAX_NEIGHBOUR], settings[SIDE_SHARE] = walls.max_neighbour, walls.min_side_share
     settings[MIN_SPACING], settings[MAX_SPACING] = walls.min_spacing, walls.max_spacing
     settings[ELONGATION], settings[COSINE] = walls.min_elongation, walls.min_cosine

@@ -1,4 +1,4 @@
-"""Reading and writing of pose graphs in the text formats of g2o and TORO.
+"""Reading and writing of pose graphs in the text formats of g2o and TORO, and what of them is not read.
 
 The error of an edge is z⁻¹ ∘ (x_i⁻¹ ∘ x_j) in g2o, with its translation in the frame of the measurement z.
 In eq. (16) it is (x̂_j ⊖ x̂_i) − z. Rotating the information by the angle of z keeps the energy the same.
@@ -7,8 +7,9 @@ In eq. (16) it is (x̂_j ⊖ x̂_i) − z. Rotating the information by the angle
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.finite import check_finite
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.files.provenance import Source, provenance_of
+from nscan_cli.files.text import counted
 from nscan_cli.graph.io.g2o_lines import G2O_REMEDY, G2oLines, key_text, keys, read_lines, rows
-from nscan_cli.graph.io.g2o_tags import loss_messages
 from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
 from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle, upper_triangle
 from nscan_cli.graph.model import Graph, Pairwise
@@ -36,7 +37,7 @@ def parse_g2o(data: bytes, path: str) -> Graph:
     rows, and the keys are the graph's `vertices`. Edges between consecutive vertices have the origin
     odometry, the others loop. Without vertices, poses come from the fewest edges to the vertex of the
     smallest key, which is at the origin. FIX only chooses the frame, so it is checked and ignored; one vertex
-    may be fixed. provenance["skipped"] counts the skipped lines by tag; g2o_tags.loss_messages explains them.
+    may be fixed. provenance["skipped"] counts the skipped lines by tag; `loss_messages` explains them.
 
     Raises InputDataError on a malformed line.
     """
@@ -165,3 +166,46 @@ def _rows_of(
         problem = f"there is no vertex {key_text(int(wanted[first]))}"
         raise InputDataError(name, problem, "add its VERTEX_SE2 line", line=int(lines[first]))
     return found
+
+
+LANDMARKS = "XY|POINT|LANDMARK|LINE|SEGMENT|PLANE|BEARING"
+LOSSES = (
+    ("SWITCH", "edges that can be switched off are not read, so these loops are not closed"),
+    ("MIXTURE|MAXMIX", "edges with several alternatives are not read, so what they join may come apart"),
+    ("PRIOR|GPS|GNSS|UTM", "priors on poses are not read, so the graph's frame is free, and its shape is "
+     "that of the edges between poses"),
+    (f"VERTEX.*({LANDMARKS})", "landmarks are not read"),
+    (f"^(LANDMARK|BR)$|EDGE.*({LANDMARKS})", "observations of landmarks are not read, so the poses are held "
+     "by the edges between poses alone"),
+    ("ROBUST", "edges with robust kernels are not read, so what they join may come apart"),
+    ("OFFSET|CALIB|PARAMS|CAMERA", "offsets and calibrations of sensors are not read, nor edges that need "
+     "them"),
+    ("VERTEX_?(SE3|3|SIM3)|EDGE_?(SE3|3|SIM3)", "of graphs in space only planar VERTEX_SE3:QUAT and "
+     "EDGE_SE3:QUAT are read"),
+    ("^VERTEX", "vertices of this kind are not read"),
+    ("^(EDGE|ODOMETRY|EQUIV)", "edges of this kind are not read, so what they join may come apart"),
+    ("LASER|TAG|IMU|IMAGE", "what sensors saw is not read from a graph"),
+    ("", "this tag is not known, and what it says is lost"),
+)  # fmt: skip
+"""Pattern of tags, and what is lost; the first pattern that matches a tag counts."""
+NAMED_TAGS = 5
+"""Largest number of tags that one sentence names."""
+SHOWN_TAG_LENGTH = 40
+"""Characters of a tag that are shown."""
+
+
+def loss_messages(skipped: Mapping[str, int]) -> list[str]:
+    """A sentence for each kind of loss, with the number of skipped lines by tag."""
+    kinds: dict[str, list[str]] = {}
+    for tag, count in skipped.items():
+        lost = next(lost for pattern, lost in LOSSES if re.search(pattern, tag))
+        name = tag if re.fullmatch("[!-~]+", tag) else ascii(tag)
+        kinds.setdefault(lost, []).append(counted(count, f"{name[:SHOWN_TAG_LENGTH]} line"))
+    sentences = []
+    for lost, lines in kinds.items():
+        if len(lines) > NAMED_TAGS:
+            lines[NAMED_TAGS:] = [f"lines of {counted(len(lines) - NAMED_TAGS, 'other tag')}"]
+        *before, last = lines
+        listed = f"{', '.join(before)} and {last}" if before else last
+        sentences.append(f"{listed} skipped: {lost}")
+    return sentences

@@ -5,8 +5,7 @@ from __future__ import annotations
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import label, read_bytes
 from nscan_cli.files.limits import GRAPH
-from nscan_cli.graph.io.g2o import parse_g2o
-from nscan_cli.graph.io.g2o_tags import loss_messages
+from nscan_cli.graph.io.g2o import loss_messages, parse_g2o
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.model import Graph
 

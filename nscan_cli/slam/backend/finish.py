@@ -7,8 +7,7 @@ import numpy as np
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.degenerate_relations import widened_relations
-from nscan_cli.slam.backend.scan_poses import between_keyframes
-from nscan_cli.slam.backend.single_scans import with_even_steps
+from nscan_cli.slam.backend.scan_poses import between_keyframes, with_even_steps
 from nscan_cli.slam.state import SlamState
 
 

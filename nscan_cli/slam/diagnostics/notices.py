@@ -13,8 +13,7 @@ from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.backend.contradicting_visits import worst_violation
-from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
-from nscan_cli.slam.backend.degenerate_stretches import degenerate_stretches
+from nscan_cli.slam.backend.degenerate_relations import all_widened_relations, degenerate_stretches
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans

@@ -9,8 +9,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import RESTARTS, TrackingProblem, TrackState
 
 
 @kernel

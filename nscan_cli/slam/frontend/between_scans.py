@@ -14,8 +14,7 @@ from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrappe
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
-from nscan_cli.slam.frontend.track_state import NEXT, TrackState
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import NEXT, TrackingProblem, TrackState
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 

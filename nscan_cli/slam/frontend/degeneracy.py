@@ -55,11 +55,8 @@ def keep_prediction(
     places, values = objective_profile(grid, settings, points, prior, pose, along)
     best = index_of_least(values)
     if values[best] < found.values[k] - options.rematch_gain:
-        further, trial, hessian = (
-            places[best] - distance_ahead(pose, prior, along),
-            pose.copy(),
-            np.empty((3, 3)),
-        )
+        further = places[best] - distance_ahead(pose, prior, along)
+        trial, hessian = pose.copy(), np.empty((3, 3))
         trial[0] += further * along[0]
         trial[1] += further * along[1]
         value, inliers = match_and_count(grid, settings, points, prior, trial, hessian)

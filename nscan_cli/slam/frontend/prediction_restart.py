@@ -16,8 +16,7 @@ from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.constant_velocity import expected_errors
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import TrackState
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import TrackingProblem, TrackState
 
 
 @kernel

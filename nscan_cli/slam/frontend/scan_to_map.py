@@ -10,7 +10,7 @@ from nscan_cli.ndt.association import begin_association, count_inliers, update_a
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import TrackingProblem
 
 
 @kernel

@@ -17,8 +17,7 @@ from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count, match_from_prediction
-from nscan_cli.slam.frontend.track_state import TrackState
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import TrackingProblem, TrackState
 from nscan_cli.slam.frontend.visible_points import range_limit
 
 

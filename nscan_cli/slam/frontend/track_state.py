@@ -1,4 +1,4 @@
-"""What tracking knows between two scans: the last poses, the odometry there, and the local map."""
+"""What the kernels of tracking work on: what is known between two scans, and the scans that are tracked."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.poses import Array
+from nscan_cli.matching.motion_model import Prior
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.frontend.local_map import LocalMap
 from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
-from nscan_cli.slam.frontend.options import ScanTrackingOptions
+from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 
 KNOWN, RESTARTS, NEXT, CONTRADICTIONS = 0, 1, 2, 3
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
@@ -53,3 +56,26 @@ class TrackState(NamedTuple):
         return cls(
             poses, np.zeros(size), odometry, inserted, inliers, deviation, errors, noise, counts, empty
         )
+
+
+class TrackingProblem(NamedTuple):
+    """n successive scans that are tracked, one after another."""
+
+    track: TrackState
+    grid: Grid
+    """The Gaussians of the local map."""
+    settings: TrackingParameters
+    points: Array
+    """(P, 2) one scan after another, each in its robot's frame. They are corrected in place."""
+    ends: Indices
+    """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
+    shares: Array
+    """(P,) times of the points as in ScanBatch; empty if there is nothing to correct."""
+    times: Array
+    """(n,) s"""
+    odometry: Array
+    """(n, 3) poses, nan where there is none."""
+    prior: Prior
+    """The prior of the scan that is matched now; each scan overwrites it."""
+    found: TrackedScans
+    """What is found of the n scans, to be filled."""

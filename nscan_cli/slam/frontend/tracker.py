@@ -20,10 +20,9 @@ from nscan_cli.slam.frontend.point_spacing import points_between
 from nscan_cli.slam.frontend.prediction_restart import surprise
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackState
+from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackingProblem, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import track_scans
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 

@@ -26,8 +26,7 @@ from nscan_cli.slam.frontend.prediction import (
 from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
-from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT, TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 

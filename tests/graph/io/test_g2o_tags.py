@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.graph.io.g2o import parse_g2o
-from nscan_cli.graph.io.g2o_tags import loss_messages
+from nscan_cli.graph.io.g2o import loss_messages, parse_g2o
 from nscan_cli.graph.io.load_graph import load_graph
 
 POSES = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"

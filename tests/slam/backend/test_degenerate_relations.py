@@ -10,8 +10,11 @@ from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.backend.degenerate_relations import length_variances, with_guess_variances
-from nscan_cli.slam.backend.degenerate_stretches import DegenerateStretch
+from nscan_cli.slam.backend.degenerate_relations import (
+    DegenerateStretch,
+    length_variances,
+    with_guess_variances,
+)
 from nscan_cli.slam.backend.options import DegenerateRelationOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import data_file

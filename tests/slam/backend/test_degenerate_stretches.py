@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.backend.degenerate_stretches import degenerate_stretches
+from nscan_cli.slam.backend.degenerate_relations import degenerate_stretches
 from nscan_cli.slam.backend.options import DegenerateStretchOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import data_file

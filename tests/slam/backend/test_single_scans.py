@@ -7,7 +7,7 @@ import pytest
 
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.backend.options import SingleScanOptions
-from nscan_cli.slam.backend.single_scans import with_even_steps
+from nscan_cli.slam.backend.scan_poses import with_even_steps
 
 OPTIONS = SingleScanOptions()
 NONE = np.zeros(0, dtype=np.int64)

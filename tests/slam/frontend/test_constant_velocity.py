@@ -12,9 +12,8 @@ from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.constant_velocity import constant_velocity, expected_errors, learn_prediction
 from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
-from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
+from nscan_cli.slam.frontend.track_state import KNOWN, TrackingProblem, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 
 OPTIONS = ScanTrackingOptions()
 
