@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.cleaning import Removed, cleaned_map
+from nscan_cli.mapping.cleaning import Removed, cleaned_map, visit_counts
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, grid_of_counts, occupancy_grid
-from nscan_cli.mapping.visits import visit_counts
 from tests.mapping.handmade_logs import log_of
 
 ANGLES = np.radians(np.arange(-180, 180) + 0.5)

@@ -12,10 +12,10 @@ import numpy as np
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.laser_view import points_in_view
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.track_state import NEXT, TrackingProblem, TrackState
-from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 @kernel

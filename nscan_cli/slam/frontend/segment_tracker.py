@@ -27,10 +27,10 @@ from nscan_cli.slam.frontend.break_detection import (
     sees_the_same,
 )
 from nscan_cli.slam.frontend.break_options import BreakOptions
+from nscan_cli.slam.frontend.laser_view import laser_view
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.sector_of_view import laser_view
 from nscan_cli.slam.frontend.tracked_scans import TrackedBatch, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.two_sided_tracker import TwoSidedTracker
@@ -156,7 +156,6 @@ class SegmentTracker:
         return [] if may_wait else self._start_segment() or self._settle_doubted()
 
     def _settle_doubted(self) -> list[TrackedBatch]:
-        """Settle the doubted scans as they were tracked."""
         scans, self._doubted = self._doubted, []
         return [settled for scan in scans for settled in self._settle(scan)]
 

@@ -14,16 +14,16 @@ from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.constant_velocity import expected_errors
+from nscan_cli.slam.frontend.laser_view import points_in_view
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan, remove_newest
+from nscan_cli.slam.frontend.match_restarts import surprise
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.point_spacing import points_between
-from nscan_cli.slam.frontend.prediction_restart import surprise
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackingProblem, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import track_scans
-from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 class Tracker:

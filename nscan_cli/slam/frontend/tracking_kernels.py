@@ -10,12 +10,17 @@ from nscan_cli.matching.motion_model import Prior, motion_sigmas, prior_value
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, restart_threshold
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.constant_velocity import learn_prediction
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.deskewing import deskew_by_last_step, deskew_by_match
+from nscan_cli.slam.frontend.laser_view import match_again_in_sector, match_in_sector, points_in_view
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
+from nscan_cli.slam.frontend.match_restarts import (
+    match_from_other_angles,
+    match_near_prediction,
+    restart_threshold,
+)
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
 from nscan_cli.slam.frontend.prediction import (
     contradicts,
@@ -23,11 +28,8 @@ from nscan_cli.slam.frontend.prediction import (
     predict_by_trusted_odometry,
     predict_steadily,
 )
-from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
-from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT, TrackingProblem
-from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 @kernel

@@ -10,8 +10,8 @@ from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.constant_velocity import constant_velocity, expected_errors, learn_prediction
+from nscan_cli.slam.frontend.match_restarts import match_near_prediction
 from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingOptions, TrackingParameters
-from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackingProblem, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 

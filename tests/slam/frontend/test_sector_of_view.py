@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.slam.frontend.laser_view import laser_view, points_in_sector
 from nscan_cli.slam.frontend.options import (
     LaserView,
     ScanTrackingOptions,
     TrackingOptions,
     TrackingParameters,
 )
-from nscan_cli.slam.frontend.sector_of_view import laser_view, points_in_sector
 from nscan_cli.slam.frontend.track_state import TrackState
 from tests.benchmarks.consistency import backwards
 from tests.benchmarks.lasers import KINDS, WAY

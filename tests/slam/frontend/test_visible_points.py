@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.laser_view import range_limit, visible_points
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.segment_tracker import tracker_of
-from nscan_cli.slam.frontend.visible_points import range_limit, visible_points
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import KINDS, WAY
 from tests.simulation.building import building, drive
