@@ -91,7 +91,6 @@ def _figure_bounds(points: Array, poses: Array) -> Bounds:
 
 
 def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[LegendEntry]:
-    """Draws the overlays. Returns the legend entries."""
     entries: list[LegendEntry] = []
     if overlays.trajectory:
         # A broad light band is visible beneath the relations.
@@ -140,7 +139,6 @@ def draw_cells(canvas: Canvas, cells: Mask, grid: OccupancyGrid, colour: Colour)
 
 
 def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
-    """Draws relations as lines and keyframes as dots. Returns the legend entries."""
     entries: list[LegendEntry] = []
     edges = edges_by_kind(graph)
     for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.0)):
@@ -154,7 +152,6 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
 
 
 def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
-    """Draws ellipses of the positions of keyframes. Returns the legend entries."""
     keyframes = sorted(graph.marginals)
     if not keyframes:
         return []

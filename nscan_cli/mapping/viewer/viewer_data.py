@@ -86,7 +86,6 @@ def viewer_data(
 
 
 def _facts(graph: Graph) -> list[tuple[str, str]]:
-    """What the page says of the whole: names and values."""
     times, path = graph.times, float(np.hypot(*np.diff(graph.poses[:, :2], axis=0).T).sum())
     accepted = sum(loop.accepted for loop in graph.loops)
     inputs = [source["name"] for source in graph.provenance.get("inputs") or []]
