@@ -106,7 +106,6 @@ def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> St
 
 
 def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
-    """Whether turns by odometry are a multiple of those by scans."""
     return turns.steps >= options.min_steps and turns.spread <= options.max_spread
 
 

@@ -106,7 +106,6 @@ def _scans_turn(
 
 
 def _clear_turns(turns: Array, options: HeldOdometryOptions) -> int:
-    """How many of some turns (n,), rad, are clear."""
     return int(np.count_nonzero(np.abs(turns) >= options.min_turn))
 
 

@@ -78,17 +78,19 @@ def measure_steps(
     points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all beams at once.
     Those in `known` are taken from there, and others are added to it.
     """
+
+    def as_at_once(row: int) -> Array | None:
+        scan = thinned_scan(log, row, options)
+        return None if scan is None else scan.points
+
+    points = corrected or as_at_once
     found: list[tuple[int, int, Array, Array]] = []
     first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
         if known is not None and (begin, end) in known:
             measured = known[begin, end]
         else:
-            before, after = (
-                _thinned_points(log, row, options) if corrected is None else corrected(row)
-                for row in (begin, end)
-            )
-            measured = _measured(before, after, options)
+            measured = _measured(points(begin), points(end), options)
             if known is not None:
                 known[begin, end] = measured
         if measured is not None:
@@ -126,9 +128,3 @@ def _measured(
     if covariance is None or why_no_minimum(match.gradient, covariance, options.pair.convergence) is not None:
         return None
     return match.pose, covariance
-
-
-def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array | None:
-    """The points (m, 2) of a scan of which only some beams are matched; None for too few."""
-    scan = thinned_scan(log, row, options)
-    return None if scan is None else scan.points

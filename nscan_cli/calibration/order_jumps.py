@@ -103,8 +103,6 @@ def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
 
 
 class _Matched(NamedTuple):
-    """Two scans, matched as they are read and with the later one mirrored."""
-
     as_read: ScanPair
     mirrored: ScanPair
     points: int

@@ -37,7 +37,6 @@ def prior_pull(prior: Prior, pose: Array) -> tuple[Triple, Triple]:
 
 @leaf_kernel
 def _row(row: Array, vector: Triple) -> float:
-    """The product of a row (3,) of a matrix with a vector."""
     total = 0.0
     for a in range(3):
         total += row[a] * vector[a]

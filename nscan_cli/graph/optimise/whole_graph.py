@@ -106,7 +106,6 @@ def _lowest_minimum(energy: GraphEnergy, given: Array, options: WholeGraphOption
 
 
 def _is_lower(found: Optimum, best: Optimum, same_energy: float) -> bool:
-    """Whether a minimum is clearly lower than the best so far, or the best is not finite."""
     return found.energy < best.energy - same_energy * (1 + best.energy) or not np.isfinite(best.energy)
 
 

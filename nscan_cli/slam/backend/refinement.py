@@ -97,18 +97,13 @@ class Refinement:
                 self._starts[centre] = near.members, poses[near.members]
                 self._found[centre] = local_match
                 waiting.pop(centre, None)
-                for other in self._alike(local_match, near, waiting):
+                # About these the same match would be made, with the same neighbours.
+                alike = () if local_match is None else local_match.alike & (waiting.keys() - self._wider)
+                for other in [k for k in alike if np.array_equal(waiting[k].members, near.members)]:
                     self._starts[other] = self._found[other] = None
                     waiting.pop(other)
             matched += len(chosen)
         return matched
-
-    def _alike(
-        self, local_match: LocalMatch | None, near: Neighbours, waiting: Mapping[int, Neighbours]
-    ) -> list[int]:
-        """The waiting centres about which the same match would be made, with the same neighbours."""
-        alike = () if local_match is None else local_match.alike & (waiting.keys() - self._wider)
-        return [k for k in alike if np.array_equal(waiting[k].members, near.members)]
 
     def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
         """The centres to match next among the waiting ones, with their neighbours.

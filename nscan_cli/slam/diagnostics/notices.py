@@ -156,7 +156,6 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
 
 
 def _companions(state: SlamState) -> list[str]:
-    """Whether something goes along with the robot that the check of the file could not see."""
     poses, options = np.concatenate(state.tracked), state.options.file_check.companion
     found = find_companion(state.log, poses, options)
     if found is None:
@@ -197,7 +196,6 @@ def _contradictions(state: SlamState) -> list[str]:
 
 
 def _free_space_violations(state: SlamState) -> list[str]:
-    """Whether visits of a place contradict each other, however well they match."""
     worst, options = worst_violation(state), state.options.loop_closure.free_space
     if worst is None or is_sound(worst, options):
         return []
@@ -211,11 +209,9 @@ def _free_space_violations(state: SlamState) -> list[str]:
 
 
 def _stretches(named: Iterable[str]) -> str:
-    """Stretches of the path, the first of many."""
     return shortened_list(list(named), "more stretch", MOST_NAMED, "; ")
 
 
 def _numbered(log: LaserLog, rows: Sequence[int]) -> str:
-    """The numbers of the scans in some rows, of the first of many."""
     numbers = [str(log.numbers[row]) for row in rows]
     return f"scan{'s' if len(rows) > 1 else ''} {shortened_list(numbers, most=MOST_NAMED)}"

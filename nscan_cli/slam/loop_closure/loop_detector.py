@@ -187,5 +187,4 @@ class LoopDetector:
 
 
 def _visit_overlap(place: Place) -> float:
-    """The overlap of the scans of both visits in a match."""
     return 0.0 if place.local_match.loop is None else place.local_match.loop.score

@@ -53,7 +53,6 @@ class LinkCache:
 
 
 def _concatenated(parts: Sequence[Links]) -> Links:
-    """Several Links as one."""
     none = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 3)))
     return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
