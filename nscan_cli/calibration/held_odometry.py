@@ -96,17 +96,15 @@ def _scans_turn(
     log: LaserLog, first: int, last: int, options: HeldOdometryOptions, steps: StepOptions
 ) -> bool:
     """Whether a few of some steps, spread over a stretch, have a clear turn."""
-    begins, ends = _rows_within(log, first, last, options.more_steps, steps)
+
+    def are_enough(turns: Array) -> bool:
+        return bool(np.count_nonzero(np.abs(turns) >= options.min_turn) >= options.min_measured)
+
+    rows = _rows_within(log, first, last, options.more_steps, steps)
     # On straight ways a rough look is enough.
-    rough = scan_turns(log, begins, ends, options.scan_turns)
-    if _clear_turns(rough, options) < options.min_measured:
-        return False
-    turns = measure_steps(log, (begins, ends), steps).laser[:, 2]
-    return _clear_turns(turns, options) >= options.min_measured
-
-
-def _clear_turns(turns: Array, options: HeldOdometryOptions) -> int:
-    return int(np.count_nonzero(np.abs(turns) >= options.min_turn))
+    return are_enough(scan_turns(log, *rows, options.scan_turns)) and are_enough(
+        measure_steps(log, rows, steps).laser[:, 2]
+    )
 
 
 def _rows_within(

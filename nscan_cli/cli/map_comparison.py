@@ -22,7 +22,7 @@ def draw_comparison(
 
     from nscan_cli.evaluation.alignment import alignment
     from nscan_cli.mapping.figures.canvas import figure_png
-    from nscan_cli.mapping.figures.comparison_plot import DrawnResult, plot_comparison
+    from nscan_cli.mapping.figures.map_plots import DrawnResult, plot_comparison
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.poses import compose
 

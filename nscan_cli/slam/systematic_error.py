@@ -19,10 +19,9 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known, relative, wrap
-from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.options import SlamOptions, SystematicErrorOptions
 from nscan_cli.slam.pipeline import LoopProgress, run_slam
 from nscan_cli.slam.state import SlamState
-from nscan_cli.slam.systematic_error_options import SystematicErrorOptions
 
 
 class SystematicError(NamedTuple):

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import wrap
-from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.options import SlamOptions, SystematicErrorOptions
 from nscan_cli.slam.systematic_error import (
     SystematicError,
     map_drive,
     systematic_error,
     without_systematic_error,
 )
-from nscan_cli.slam.systematic_error_options import SystematicErrorOptions
 from tests.benchmarks.lasers import HARD, recorded, rms
 from tests.simulation.scenes import office
 

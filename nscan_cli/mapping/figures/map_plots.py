@@ -1,9 +1,10 @@
-"""Pictures of a map for people: overlays from the graph on the map, and a figure for a paper."""
+"""Pictures of a map for people: overlays from the graph, a figure for a paper, and two maps compared."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
 from nscan_cli.mapping.map_server import gray_image
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, grid_of_counts
 from nscan_cli.poses import Array, Indices, Mask, transform
 
 MIN_PIXELS, MAX_PIXELS = 1600, 3200
@@ -39,6 +40,8 @@ OUTLIER_QUANTILE = 5e-4
 """Share of the points that may lie outside a figure on each of its sides."""
 MIN_ELLIPSE = 8.0
 """Least longer half axis of a visible ellipse, units."""
+KINDS = (("unconnected", SKY, "not connected"), ("specks", VERMILLION, "specks"), ("gone", PURPLE, "gone"))
+"""What cleaning removes: its name in Removed, its colour, and its name in the picture."""
 
 
 @dataclass(frozen=True)
@@ -171,9 +174,6 @@ def _points_of_occupied_cells(log: LaserLog, rows: Indices, poses: Array, grid: 
     return occupied
 
 
-KINDS = (("unconnected", SKY, "not connected"), ("specks", VERMILLION, "specks"), ("gone", PURPLE, "gone"))
-
-
 def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:
     """The cleaned map in soft grays, with the removed cells in colour; a scale bar and a legend below."""
     canvas = map_canvas(grid)
@@ -184,3 +184,52 @@ def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:
         entries.append(("disc", colour, f"{text}: {np.count_nonzero(cells)} cells"))
     draw_scale_bar(canvas, entries)
     return canvas
+
+
+class DrawnResult(NamedTuple):
+    """One of two results in a common frame."""
+
+    name: str
+    grid: OccupancyGrid
+    path: Array
+    """(N, 2) m"""
+
+
+def plot_comparison(first: DrawnResult, second: DrawnResult) -> Canvas:
+    """Walls of both dark, walls of one alone in its colour, and both paths in theirs; names below.
+
+    Walls agree where both have a cell within one cell: maps differ by that much by the raster alone.
+    """
+    from scipy import ndimage
+
+    size = first.grid.resolution
+    bounds = np.array([first.grid.bounds, second.grid.bounds]) / size
+    left, bottom = np.round(bounds[:, :2].min(axis=0)).astype(int).tolist()
+    right, top = np.round(bounds[:, 2:].max(axis=0)).astype(int).tolist()
+    states = [_placed(drawn.grid, left, bottom, (top - bottom, right - left)) for drawn in (first, second)]
+    walls = [state == OCCUPIED for state in states]
+    around = np.ones((3, 3), dtype=np.bool_)
+    alone = [
+        wall & ~ndimage.binary_dilation(other, around) for wall, other in zip(walls, walls[::-1], strict=True)
+    ]
+    agreed = (walls[0] | walls[1]) & ~alone[0] & ~alone[1]
+    free = (states[0] == FREE) | (states[1] == FREE) | alone[0] | alone[1]
+    hits = np.where(agreed, 10, 0).astype(np.int32)
+    corner = (left * size, bottom * size)
+    both = grid_of_counts(hits, (free & ~agreed).astype(np.int32), size, corner)
+    canvas = map_canvas(both)
+    for drawn, cells, colour in ((first, alone[0], BLUE), (second, alone[1], VERMILLION)):
+        draw_cells(canvas, cells, both, colour)
+        canvas.line(drawn.path, colour, 1.2)
+    draw_scale_bar(canvas, [("line", BLUE, first.name), ("line", VERMILLION, second.name)])
+    return canvas
+
+
+def _placed(grid: OccupancyGrid, left: int, bottom: int, shape: tuple[int, int]) -> NDArray[np.int8]:
+    """The states of a grid in a larger one, whose lower left corner is at (left, bottom) cells."""
+    states = np.full(shape, -1, dtype=np.int8)
+    column, line = (round(at / grid.resolution) for at in grid.origin)
+    height, width = grid.shape
+    rows = slice(line - bottom, line - bottom + height)
+    states[rows, column - left : column - left + width] = grid.states()
+    return states

@@ -8,9 +8,14 @@ from nscan_cli.mapping.figures.axes import LegendEntry
 from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Canvas
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
-from nscan_cli.mapping.figures.error_plots import REFERENCE_COLOUR, plot_against_reference, plot_relations
+from nscan_cli.mapping.figures.error_plots import (
+    LABEL_RADIUS,
+    REFERENCE_COLOUR,
+    draw_number_labels,
+    plot_against_reference,
+    plot_relations,
+)
 from nscan_cli.mapping.figures.match_plots import POINT_OPACITY, plot_match, plot_nscan
-from nscan_cli.mapping.figures.number_labels import LABEL_RADIUS, draw_number_labels
 from nscan_cli.mapping.figures.panels import MIN_ASPECT, bounds_around, panel, stacked_panels
 from nscan_cli.matching.joint.joint_energy import all_pairs
 from nscan_cli.matching.joint.joint_match import JointMatch
