@@ -12,6 +12,7 @@ from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
+from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.segment_tracker import tracker_of
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
@@ -36,7 +37,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
         SpeculativeMatching(state.match, state.options.nscan, state.threads) as ahead,
         BackgroundCalls(state.threads) as beside,
     ):
-        for scans in state.scan_batches():
+        for scans in scan_batches(state.log, state.options.tracking, state.odometry, state.frozen_scans):
             done = scans.first + len(scans)
             for batch in tracker.follow(scans) + (tracker.finish() if done == len(state.log) else []):
                 if add_keyframes(state, batch):

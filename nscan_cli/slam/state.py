@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,6 @@ from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, restarts_of, without_jumps
 from nscan_cli.slam.frontend.odometry_stalls import without_stalls
-from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
@@ -114,10 +113,6 @@ class SlamState:
             self.energies.forget()
 
         return restore
-
-    def scan_batches(self) -> Iterator[ScanBatch]:
-        """The scans of the log as tracking takes them."""
-        return scan_batches(self.log, self.options.tracking, self.odometry, self.frozen_scans)
 
     @property
     def poses(self) -> Array:
