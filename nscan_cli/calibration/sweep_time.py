@@ -6,7 +6,6 @@ energies have a minimum at the true one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +70,7 @@ def _energies(motion: ScanMotion, longest: float, sweeps: Array, options: SweepC
     """(P, T) energies of P pairs for times of a sweep (T,), of scans in steady turns if there are enough."""
     time = options.time
     steady, uneven = list[Array](), list[Array]()
-    for one, other in _pairs(motion, longest, options):
+    for one, other in turning_pairs(motion, longest, options, time.scans, time.most_rows):
         is_steady = motion.is_steady(one, time) and motion.is_steady(other, time)
         if not is_steady and len(uneven) == time.pairs:
             continue
@@ -83,10 +82,6 @@ def _energies(motion: ScanMotion, longest: float, sweeps: Array, options: SweepC
     if len(steady) < time.min_steady:
         steady += uneven[: time.pairs - len(steady)]
     return np.array(steady).reshape(-1, len(sweeps))
-
-
-def _pairs(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
-    return turning_pairs(motion, longest, options, options.time.scans, options.time.most_rows)
 
 
 def _sharpest(sweeps: Array, energies: Array, options: SweepTimeOptions) -> float:
