@@ -12,8 +12,9 @@ from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
-from nscan_cli.slam.frontend.scan_batch import scan_batches
-from nscan_cli.slam.frontend.segment_tracker import tracker_of
+from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
+from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
@@ -38,12 +39,11 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
         BackgroundCalls(state.threads) as beside,
     ):
         for scans in scan_batches(state.log, state.options.tracking, state.odometry, state.frozen_scans):
-            done = scans.first + len(scans)
-            for batch in tracker.follow(scans) + (tracker.finish() if done == len(state.log) else []):
+            for batch in track(tracker, scans, is_last=scans.first + len(scans) == len(state.log)):
                 if add_keyframes(state, batch):
                     # The newest keyframe still collects scans.
                     beside(partial(grow, state, ahead), len(state.keyframes) - 1)
-            report(done, len(state.keyframes))
+            report(scans.first + len(scans), len(state.keyframes))
         ahead.open()
     state.tracking_restarts, state.tracking_searches = tracker.restarts, tracker.searches
     state.keyframes.end_segment()
@@ -56,6 +56,12 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     refine(state)
     mend_contradicting_visits(state)
     return finish_graph(state)
+
+
+def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[TrackedBatch]:
+    """Step 1: match each scan with the map of the last metres; returns the scans that are settled by it."""
+    settled = tracker.follow(scans)
+    return settled + tracker.finish() if is_last else settled
 
 
 def grow(state: SlamState, ahead: SpeculativeMatching, size: int) -> None:
