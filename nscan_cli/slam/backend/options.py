@@ -115,16 +115,19 @@ class UnevenMotionOptions:
     max_beams: int = 240
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
     longer."""
+    coarse_stride: int = 2
+    """Of the points one in so many is matched in the stages before the last. A larger number is coarser, and
+    takes less time."""
     scale: float = 0.3
     """Factor that makes a negative log likelihood of the energy of the beams. A larger value believes them
     more."""
-    widenings: tuple[float, ...] = (0.3, 1.0)
+    widenings: tuple[float, ...] = (0.2, 1.0)
     """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
     w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer."""
-    tolerance: float = 3e-3
+    tolerance: float = 5e-3
     """The last stage has ended when no pose moves by more, m and rad. A larger value is less exact and takes
     less time."""
-    coarse_tolerance: float = 1e-2
+    coarse_tolerance: float = 2e-2
     """The stages before have ended when no pose moves by more, m and rad. A larger value is less exact and
     takes less time."""
 
