@@ -73,7 +73,7 @@ def nscan(
     import numpy as np
 
     from nscan_cli.matching.joint.nscan_match import nscan_match
-    from nscan_cli.matching.joint.odometry_chain import odometry_priors
+    from nscan_cli.matching.joint.odometry_priors import odometry_priors
     from nscan_cli.matching.joint.options import JointOptions
     from nscan_cli.matching.motion_model import MotionModel
     from nscan_cli.matching.pairwise import PairOptions, matched_points

@@ -23,7 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
-from nscan_cli.matching.joint.odometry_chain import odometry_priors, priors_of
+from nscan_cli.matching.joint.odometry_priors import odometry_priors, priors_of
 from nscan_cli.matching.motion_model import MotionModel
 from nscan_cli.poses import Array, relative
 

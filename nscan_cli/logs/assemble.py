@@ -17,9 +17,9 @@ from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.direction_changes import corrected_directions
 from nscan_cli.logs.floor_line import floor_line, without_floor
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
+from nscan_cli.logs.jittery_odometry import without_jitter
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
-from nscan_cli.logs.noisy_odometry import without_noise
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
@@ -230,7 +230,7 @@ def _credible(
     if options.as_recorded:
         return odometry, []
     odometry, both = of_one_source(odometry, times)
-    odometry, noise = without_noise(odometry, times)
+    odometry, noise = without_jitter(odometry, times)
     odometry, wrong = without_outliers(odometry, times)
     odometry, slow = without_repeats(odometry, times, scans)
     return odometry, [text for text in (both, noise, wrong, slow) if text]

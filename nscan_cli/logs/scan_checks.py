@@ -11,7 +11,7 @@ from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.direction_changes import DirectionChangeOptions
 from nscan_cli.logs.floor_line import FloorLineOptions
 from nscan_cli.logs.heading_unit import HeadingUnitOptions
-from nscan_cli.logs.noisy_odometry import NoisyOdometryOptions
+from nscan_cli.logs.jittery_odometry import JitteryOdometryOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
 from nscan_cli.logs.range_peaks import RangeLimitOptions
@@ -93,7 +93,7 @@ class ScanCheckOptions:
     """Whether headings are in radians."""
     two_odometries: TwoOdometriesOptions = field(default_factory=TwoOdometriesOptions)
     """Whether poses come from two sources."""
-    noisy_odometry: NoisyOdometryOptions = field(default_factory=NoisyOdometryOptions)
+    jittery_odometry: JitteryOdometryOptions = field(default_factory=JitteryOdometryOptions)
     """Odometry that goes to and fro as no robot does."""
     odometry_outliers: OdometryOutlierOptions = field(default_factory=OdometryOutlierOptions)
     """Single wrong poses of the odometry."""

@@ -9,9 +9,9 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visits
 from nscan_cli.slam.backend.final_deskewing import deskew_by_final_path
 from nscan_cli.slam.backend.finish import finish_graph
+from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
-from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
 from nscan_cli.slam.frontend.tracked_scans import TrackedBatch

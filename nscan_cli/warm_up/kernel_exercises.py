@@ -59,8 +59,8 @@ def _refine() -> None:
     from nscan_cli.logs.load import log_from
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.slam.backend.finish import finish_graph
+    from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
     from nscan_cli.slam.backend.refinement import refine
-    from nscan_cli.slam.backend.rejection import reject_contradicting_loops
     from nscan_cli.slam.backend.resume import state_of_graph
     from nscan_cli.slam.backend.subgraph import nearest_keyframes
     from nscan_cli.slam.diagnostics.notices import notices

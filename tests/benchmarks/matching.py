@@ -14,7 +14,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.nscan_match import nscan_match
-from nscan_cli.matching.joint.odometry_chain import odometry_priors
+from nscan_cli.matching.joint.odometry_priors import odometry_priors
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.motion_model import MotionModel

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
+from nscan_cli.graph.optimise.relation_terms import nscan_term, nscan_value
 from nscan_cli.graph.optimise.term_cache import TermCache, TermColumns
-from nscan_cli.graph.optimise.terms import nscan_term, nscan_value
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices, Mask

@@ -1,6 +1,6 @@
 """The relation of n keyframes whose scans were matched jointly (paper, IV, eqs. (18) to (23)).
 
-The relation is data. Eqs. (18) to (25) themselves are computed by `nscan_term` in graph/optimise/terms.py.
+The relation is data. `nscan_term` in graph/optimise/relation_terms.py computes eqs. (18) to (25) themselves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class NScan:
     """Overlap of the scans, 0 to 1; 0 where it is not known."""
 
     def term(self) -> Term:
-        """fᵗHf, eq. (23)."""
+        """What fᵗHf, eq. (23), is made of; `nscan_term` in graph/optimise/relation_terms.py computes it."""
         return Term(self.poses, self.hessian, self.fixed)
 
     def content(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Deskewing once more: scans of a turning laser are corrected by the path after the last optimisation.
+"""Deskewing once more: scans of a turning laser are corrected by the path of the optimised graph.
 
 Tracking knows the motion during a sweep from odometry, or from the scans before alone. The final path has
 poses on both sides of each sweep, and more of them where the motion is uneven and odometry does not tell it.

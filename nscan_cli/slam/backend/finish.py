@@ -7,7 +7,8 @@ import numpy as np
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.degenerate_relations import widened_relations
-from nscan_cli.slam.backend.scan_poses import between_keyframes, with_even_steps
+from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.backend.single_scan_jumps import without_single_jumps
 from nscan_cli.slam.state import SlamState
 
 
@@ -18,7 +19,9 @@ def finish_graph(state: SlamState) -> Graph:
     anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
     turn = state.options.optimisation.metres_per_radian
     pairwise, nscan = widened_relations(state)
-    tracked = with_even_steps(np.concatenate(state.tracked), log.odometry, rows, state.options.single_scans)
+    tracked = without_single_jumps(
+        np.concatenate(state.tracked), log.odometry, rows, state.options.single_scans
+    )
     graph = Graph(
         scans=log.numbers,
         stamps=list(log.stamps),

@@ -15,8 +15,8 @@ import numpy as np
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.pose_kernels import largest_motion
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
 from nscan_cli.slam.backend.optimisation import optimise
-from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher

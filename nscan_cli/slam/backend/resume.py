@@ -19,8 +19,8 @@ from nscan_cli.matching.motion_model import odometry_prior
 from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.final_deskewing import add_keyframes_at, tracked_at
 from nscan_cli.slam.backend.finish import finish_graph
+from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
 from nscan_cli.slam.backend.refinement import refine
-from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.loop_closure.place import Place

@@ -1,8 +1,4 @@
-"""The final poses of all scans, which follow the correction of the keyframes on either side.
-
-Tracking decides where a scan is before it knows the next ones. With the scans on both sides, one that jumps
-away and back while odometry goes on evenly is put where both of them lead.
-"""
+"""The final poses of all scans, which follow the correction of the keyframes on either side."""
 
 from __future__ import annotations
 
@@ -11,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.logs.robot_path import bent_between
-from nscan_cli.poses import Array, Indices, relative, wrap
-from nscan_cli.slam.backend.options import OptimisationOptions, SingleScanOptions
+from nscan_cli.poses import Array, Indices, wrap
+from nscan_cli.slam.backend.options import OptimisationOptions
 
 
 def between_keyframes(
@@ -39,31 +35,3 @@ def between_keyframes(
     bends = (length > 0.0) & ~np.isin(keyframes[after], list(breaks))
     share = np.divide(path - start, length, out=np.zeros(len(path)), where=bends)
     return bent_between(tracked, tracked[keyframes], poses, (before, after), share)
-
-
-def with_even_steps(
-    tracked: Array, odometry: Array | None, keyframes: Indices, options: SingleScanOptions
-) -> Array:
-    """(S, 3) tracked poses (S, 3), with single scans that jump to and fro moved between their neighbours.
-
-    Keyframes, which are matched on their own, stay. Without odometry (S, 3) all do.
-    """
-    if odometry is None or len(tracked) < 3:
-        return tracked
-    steps, by_odometry = (relative(path[1:], path[:-1]) for path in (tracked, odometry))
-    off = steps - by_odometry
-    off[:, 2] = wrap(off[:, 2])
-    jump, turn = (_sizes(np.diff(each, axis=0), options) for each in (steps, by_odometry))
-    returns = _sizes(off[1:] + off[:-1], options) < options.max_return * _sizes(np.diff(off, axis=0), options)
-    lengths = _sizes(by_odometry, options)
-    is_near = np.maximum(lengths[1:], lengths[:-1]) < options.max_step
-    is_off = is_near & (jump > options.min_jump) & (turn < options.max_share * jump) & returns
-    rows = np.setdiff1d(np.flatnonzero(is_off) + 1, keyframes)
-    found, beside = tracked.copy(), (rows - 1, rows + 1)
-    found[rows] = bent_between(odometry[rows], odometry, tracked, beside, np.full(len(rows), 0.5))
-    return found
-
-
-def _sizes(steps: Array, options: SingleScanOptions) -> Array:
-    """(n,) sizes of differences of poses (n, 3), m."""
-    return np.sqrt(steps[:, 0] ** 2 + steps[:, 1] ** 2 + (options.metres_per_radian * steps[:, 2]) ** 2)

@@ -16,7 +16,7 @@ from nscan_cli.slam.frontend.track_state import TrackState
 
 
 @kernel
-def predict(
+def predict_prior(
     track: TrackState,
     options: ScanTrackingOptions,
     time: float,
@@ -49,12 +49,12 @@ def predict(
 
 
 @kernel
-def predict_by_trusted_odometry(
+def predict_prior_by_trusted_odometry(
     track: TrackState, options: ScanTrackingOptions, time: float, odometry: Array, prior: Prior
 ) -> None:
-    """Write the prior as `predict` does, with the deviations of trusted odometry, narrowed by what was
+    """Write the prior as `predict_prior` does, with the deviations of trusted odometry, narrowed by what was
     learned."""
-    predict(track, options, time, odometry, options.trusted_odometry, prior)
+    predict_prior(track, options, time, odometry, options.trusted_odometry, prior)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         step, noise = np.empty(3), options.odometry_noise
         relative_pose(odometry, track.odometry, step)
@@ -67,7 +67,9 @@ def predict_by_trusted_odometry(
 
 
 @kernel
-def predict_steadily(track: TrackState, options: ScanTrackingOptions, time: float, prior: Prior) -> None:
+def predict_prior_steadily(
+    track: TrackState, options: ScanTrackingOptions, time: float, prior: Prior
+) -> None:
     """Move the prior without odometry to where the mean velocity of all last steps leads."""
     step = np.empty(3)
     constant_velocity(track, options, time, True, step)

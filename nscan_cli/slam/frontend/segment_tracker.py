@@ -153,7 +153,7 @@ class SegmentTracker:
         assert self._last_seeing is not None
         if sees_the_same(scan, self._last_seeing, self.breaking):
             return self._settle_doubted()
-        return [] if may_wait else self._start_segment() or self._settle_doubted()
+        return [] if may_wait else self._break_track_if_sure() or self._settle_doubted()
 
     def _settle_doubted(self) -> list[TrackedBatch]:
         scans, self._doubted = self._doubted, []
@@ -186,10 +186,12 @@ class SegmentTracker:
             return []
         first, found = waiting[0], TrackedScans.together(batch.tracked for batch in waiting)
         poses = first.tracked.poses.copy()
-        poses[0] = place_first(ScanBatch.together([batch.scans for batch in waiting]), found, self.options)
+        poses[0] = pose_of_first_scan(
+            ScanBatch.together([batch.scans for batch in waiting]), found, self.options
+        )
         return [replace(first, tracked=first.tracked._replace(poses=poses)), *waiting[1:]]
 
-    def _start_segment(self) -> list[TrackedBatch]:
+    def _break_track_if_sure(self) -> list[TrackedBatch]:
         """Track the doubted scans anew, as a segment of their own; empty if they do not fit together.
 
         The track is broken, and the way there unknown, unless odometry bridges it.
@@ -234,7 +236,7 @@ def tracker_of(log: LaserLog, options: SlamOptions) -> SegmentTracker:
     )
 
 
-def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions) -> Array:
+def pose_of_first_scan(scans: ScanBatch, found: TrackedScans, options: TrackingOptions) -> Array:
     """The pose (3,) of the first of some scans, matched with the others; the step to the next is the prior.
 
     It stays where it was found if too few of its points are inliers.

@@ -24,9 +24,9 @@ from nscan_cli.slam.frontend.match_restarts import (
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
 from nscan_cli.slam.frontend.prediction import (
     contradicts,
-    predict,
-    predict_by_trusted_odometry,
-    predict_steadily,
+    predict_prior,
+    predict_prior_by_trusted_odometry,
+    predict_prior_steadily,
 )
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT, TrackingProblem
@@ -105,7 +105,7 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     energy = value - prior_value(prior, found.poses[k])
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
-    predict(problem.track, options, problem.times[k], problem.odometry[k], options.odometry, prior)
+    predict_prior(problem.track, options, problem.times[k], problem.odometry[k], options.odometry, prior)
     match_from_prediction(problem, points, k)
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
@@ -164,7 +164,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
-            predict_by_trusted_odometry(track, options, problem.times[k], odometry[k], prior)
+            predict_prior_by_trusted_odometry(track, options, problem.times[k], odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
             shares = problem.shares[ends[k] : ends[k + 1]]
             if is_swept:
@@ -191,7 +191,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
                 matched = match_again_in_sector(problem, in_view, k)
             if track.counts[KNOWN] >= options.degeneracy_poses and not has_odometry:
                 found.values[k] -= prior_value(prior, found.poses[k])
-                predict_steadily(track, options, problem.times[k], prior)
+                predict_prior_steadily(track, options, problem.times[k], prior)
                 found.values[k] += prior_value(prior, found.poses[k])
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
         _settle(problem, k)

@@ -11,7 +11,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.options import TrackingOptions
-from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, place_first
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, pose_of_first_scan
 from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.scenes import office
@@ -78,7 +78,9 @@ def test_it_stays_where_nothing_says_better():
         ([scans[0], *elsewhere], found),
         ([np.empty((0, 2)), *scans[1:]], found),
     ):
-        np.testing.assert_array_equal(place_first(sensed(points), found_of(*poses), options), found[0].pose)
+        np.testing.assert_array_equal(
+            pose_of_first_scan(sensed(points), found_of(*poses), options), found[0].pose
+        )
 
 
 def test_a_log_that_ends_at_once_keeps_all_its_scans():

@@ -7,7 +7,7 @@ import pytest
 
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.backend.options import SingleScanOptions
-from nscan_cli.slam.backend.scan_poses import with_even_steps
+from nscan_cli.slam.backend.single_scan_jumps import without_single_jumps
 
 OPTIONS = SingleScanOptions()
 NONE = np.zeros(0, dtype=np.int64)
@@ -25,7 +25,7 @@ def path(length: float = 0.05, count: int = 40) -> Array:
 def test_a_scan_that_jumps_to_and_fro_is_put_between_its_neighbours(off):
     odometry, tracked = path(), path()
     tracked[20] = compose(tracked[20], np.array(off))
-    found = with_even_steps(tracked, odometry, NONE, OPTIONS)
+    found = without_single_jumps(tracked, odometry, NONE, OPTIONS)
     np.testing.assert_allclose(found, path(), atol=1e-3)
 
 
@@ -34,18 +34,18 @@ def test_what_odometry_does_not_tell_better_stays():
     tracked[20] = compose(tracked[20], np.array([0.1, 0.0, 0.0]))
     jumps = path()
     jumps[20] = tracked[20]
-    np.testing.assert_array_equal(with_even_steps(tracked, jumps, NONE, OPTIONS), tracked)
-    np.testing.assert_array_equal(with_even_steps(tracked, None, NONE, OPTIONS), tracked)
-    np.testing.assert_array_equal(with_even_steps(tracked, path(), np.array([0, 20]), OPTIONS), tracked)
+    np.testing.assert_array_equal(without_single_jumps(tracked, jumps, NONE, OPTIONS), tracked)
+    np.testing.assert_array_equal(without_single_jumps(tracked, None, NONE, OPTIONS), tracked)
+    np.testing.assert_array_equal(without_single_jumps(tracked, path(), np.array([0, 20]), OPTIONS), tracked)
     unknown = path()
     unknown[21] = np.nan
-    np.testing.assert_array_equal(with_even_steps(tracked, unknown, NONE, OPTIONS), tracked)
+    np.testing.assert_array_equal(without_single_jumps(tracked, unknown, NONE, OPTIONS), tracked)
 
 
 def test_steps_that_do_not_lead_back_and_long_ones_stay():
     slipped = path()
     slipped[20:] = compose(np.array([0.12, 0.0, 0.0]), slipped[20:])
-    np.testing.assert_array_equal(with_even_steps(slipped, path(), NONE, OPTIONS), slipped)
+    np.testing.assert_array_equal(without_single_jumps(slipped, path(), NONE, OPTIONS), slipped)
     far = path(0.3)
     far[20] = compose(far[20], np.array([0.12, 0.0, 0.0]))
-    np.testing.assert_array_equal(with_even_steps(far, path(0.3), NONE, OPTIONS), far)
+    np.testing.assert_array_equal(without_single_jumps(far, path(0.3), NONE, OPTIONS), far)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.logs.jittery_odometry import JitteryOdometryOptions, without_jitter
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.noisy_odometry import NoisyOdometryOptions, without_noise
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known
 from tests.data import data_file
@@ -32,7 +32,7 @@ def noisy(poses: Array, distance: float, turn: float, rows: slice = BURST) -> Ar
 @pytest.mark.parametrize(("distance", "turn"), [(0.2, 0.0), (0.5, 0.0), (0.0, 0.35), (0.5, 0.35)])
 def test_noise_is_not_used(distance, turn):
     poses, times = drive()
-    found, said = without_noise(noisy(poses, distance, turn), times)
+    found, said = without_jitter(noisy(poses, distance, turn), times)
     known = are_known(found)
     assert said.startswith(BEGINNING)
     assert np.abs(found[known] - poses[known]).max() < 0.25
@@ -44,7 +44,7 @@ def test_noise_is_not_used(distance, turn):
 def test_each_stretch_is_named():
     poses, times = drive()
     broken = noisy(noisy(poses, 0.5, 0.0), 0.5, 0.0, slice(20, 50))
-    said = without_noise(broken, times)[1]
+    said = without_jitter(broken, times)[1]
     assert said.count(" to ") == 1 + 2
     assert "there, and steady motion takes its place" in said
 
@@ -52,16 +52,16 @@ def test_each_stretch_is_named():
 @pytest.mark.parametrize(
     "options",
     [
-        NoisyOdometryOptions(max_correlation=-1.0),
-        NoisyOdometryOptions(min_distance=2.0),
-        NoisyOdometryOptions(min_of_steps=1.5),
-        NoisyOdometryOptions(max_share=0.05),
+        JitteryOdometryOptions(max_correlation=-1.0),
+        JitteryOdometryOptions(min_distance=2.0),
+        JitteryOdometryOptions(min_of_steps=1.5),
+        JitteryOdometryOptions(max_share=0.05),
     ],
 )
 def test_each_bound_decides(options):
     poses, times = drive()
     broken = noisy(poses, 0.5, 0.0)
-    assert without_noise(broken, times, options)[0] is broken
+    assert without_jitter(broken, times, options)[0] is broken
 
 
 def test_a_reset_a_stop_and_a_robot_that_shuttles_are_none():
@@ -71,7 +71,7 @@ def test_a_reset_a_stop_and_a_robot_that_shuttles_are_none():
     stop[100:110] = poses[100]
     shuttle[:, 0] = 0.1 * np.abs(np.mod(np.arange(200), 10) - 5)
     for odometry in (poses, reset, stop, shuttle):
-        assert without_noise(odometry, times)[0] is odometry
+        assert without_jitter(odometry, times)[0] is odometry
 
 
 @pytest.mark.parametrize("unit", [100.0, 1000.0])
@@ -80,19 +80,19 @@ def test_another_unit_is_no_noise(unit):
     poses, times = drive()
     uneven = times + 0.02 * (-1.0) ** np.arange(len(times))
     scaled = poses * (unit, unit, 1.0)
-    assert without_noise(scaled, uneven)[0] is scaled
-    few = NoisyOdometryOptions(min_of_steps=0.0, max_share=1.0)
-    assert without_noise(scaled, uneven, few)[1].startswith(BEGINNING)
+    assert without_jitter(scaled, uneven)[0] is scaled
+    few = JitteryOdometryOptions(min_of_steps=0.0, max_share=1.0)
+    assert without_jitter(scaled, uneven, few)[1].startswith(BEGINNING)
 
 
 def test_unknown_poses_stay_unknown():
     poses, times = drive()
     broken = noisy(poses, 0.5, 0.0)
     broken[40] = np.nan
-    found, said = without_noise(broken, times)
+    found, said = without_jitter(broken, times)
     assert said
     assert np.isnan(found[40]).all()
-    assert without_noise(broken[:5], times[:5])[1] == ""
+    assert without_jitter(broken[:5], times[:5])[1] == ""
 
 
 def test_a_text_log_is_read_so(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.optimise.terms import nscan_term
+from nscan_cli.graph.optimise.relation_terms import nscan_term
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
 from tests.graph.reference_terms import derivative, nscan_error, pairwise_error, second_derivative, term
 from tests.graph.small_graph import matrices

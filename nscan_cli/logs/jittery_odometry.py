@@ -17,7 +17,7 @@ from nscan_cli.poses import Array, Mask, are_known, wrap
 
 
 @dataclass(frozen=True)
-class NoisyOdometryOptions:
+class JitteryOdometryOptions:
     """When odometry goes to and fro as no robot does."""
 
     min_distance: float = 0.25
@@ -49,8 +49,8 @@ class NoisyOdometryOptions:
     less."""
 
 
-def without_noise(
-    odometry: Array, times: Array, options: NoisyOdometryOptions = NoisyOdometryOptions()
+def without_jitter(
+    odometry: Array, times: Array, options: JitteryOdometryOptions = JitteryOdometryOptions()
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, unknown where it goes to and fro as no robot does; and what to say.
 
@@ -90,7 +90,7 @@ def without_noise(
     )
 
 
-def _goes_to_and_fro(off: Array, steps: Array, limits: Array, options: NoisyOdometryOptions) -> Mask:
+def _goes_to_and_fro(off: Array, steps: Array, limits: Array, options: JitteryOdometryOptions) -> Mask:
     """(n,) which of successive poses are noise. They are `off` (n, d) a steady way, and robots may be off it
     by limits (n,), m or rad. `steps` (n, d) lead to the next poses."""
     size, sides = options.window, (off[1:] * off[:-1]).sum(axis=1)
