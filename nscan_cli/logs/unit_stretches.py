@@ -107,7 +107,7 @@ def _unit(
     """
     at = np.flatnonzero(np.diff(is_far.astype(np.int8)))
     both = is_told[at] & is_told[at + 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         off = np.abs(np.log(some[at + 1] / some[at]))
     sure = RangeUnitOptions()
     for name, scale in UNITS:
