@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import TIME
 from nscan_cli.files.text import counted
+from nscan_cli.logs.copies import come_equally_often, repeat_reading
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.shared_stamps import spread_stamps
 from nscan_cli.logs.stamp_unit import stamp_unit
-from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.poses import Array, Indices
 
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A time in seconds as text. Other texts that float() accepts, such as 1_0, are none."""
@@ -73,11 +74,8 @@ def scans_by_time(
     A driver or a recorder has sent these again: with the same stamp, or at a higher rate than that of the
     laser, all of them equally often.
     """
-    repeats = _repeats_reading(ranges)
-    begins = np.flatnonzero(~repeats)
-    lengths = np.diff(np.append(begins, len(stamps)))
-    usual = int(np.median(lengths)) if len(lengths) else 1
-    if usual == 1 or np.mean(lengths == usual) < options.min_regular_share:
+    repeats = repeat_reading(ranges)
+    if not come_equally_often(repeats, options.min_regular_share):
         rows = np.flatnonzero(repeats)
         repeats[rows] = [stamps[row] == stamps[row - 1] for row in rows.tolist()]
     if repeats.any():
@@ -88,17 +86,6 @@ def scans_by_time(
             said = f"{counted(int(repeats.sum()), 'scan')} with the readings of the one before: left out"
             return replace(order, rows=kept[order.rows], warnings=[said, *order.warnings])
     return by_time(stamps, options)
-
-
-def _repeats_reading(ranges: NDArray[np.float32]) -> Mask:
-    """(S,) which scans have the readings (S, B) of the one before, each to the last bit."""
-    bits = np.ascontiguousarray(ranges, np.float32).view(np.int32)
-    some = bits[:, :: max(bits.shape[1] // 8, 1)]
-    repeats = np.append(False, (some[1:] == some[:-1]).all(axis=1))[: len(bits)]
-    # A few beams tell nearly all scans apart.
-    rows = np.flatnonzero(repeats)
-    repeats[rows] = (bits[rows] == bits[rows - 1]).all(axis=1)
-    return repeats
 
 
 def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -> ScanOrder:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.logs.copies import repeat_reading
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices, Mask, are_known, compose, relative
 from nscan_cli.slam.frontend.break_options import BreakOptions
@@ -18,8 +19,6 @@ from nscan_cli.slam.frontend.view_similarity import view_similarity
 
 SHORTEST_PERIOD = 1e-3
 """s; a median period is at least this, to divide by."""
-BEAM_STRIDE = 16
-"""Every beam in this many is compared first; these tell nearly all scans apart."""
 NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
 
 
@@ -107,16 +106,8 @@ def frozen_scans(log: LaserLog, odometry: Array | None, options: OdometryCheckOp
 def repeated_scans(log: LaserLog, moves: NDArray[np.bool_]) -> NDArray[np.int64]:
     """The rows (H,) whose readings repeat those before, among the rows to which the robot `moves` (S −
     1,)."""
-    rows = np.flatnonzero(moves & _equal_readings(log.ranges[:, ::BEAM_STRIDE])) + 1
-    repeats = [_equal_readings(log.ranges[row - 1 : row + 1])[0] for row in rows.tolist()]
-    return rows[np.array(repeats, dtype=np.bool_) & np.isfinite(log.ranges[rows]).any(axis=1)]
-
-
-def _equal_readings(ranges: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """(S − 1,) whether the readings (S, B) of a scan are all those of the one before."""
-    one, other = ranges[1:], ranges[:-1]
-    same: NDArray[np.bool_] = ((one == other) | (np.isnan(one) & np.isnan(other))).all(axis=1)
-    return same
+    rows = np.flatnonzero(moves & repeat_reading(log.ranges)[1:]) + 1
+    return rows[np.isfinite(log.ranges[rows]).any(axis=1)]
 
 
 def restarts_of(log: LaserLog, options: OdometryCheckOptions, breaks: BreakOptions) -> Indices:
