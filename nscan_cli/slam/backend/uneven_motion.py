@@ -21,7 +21,7 @@ from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Mask, relative, wrap
 from nscan_cli.slam.backend.options import UnevenMotionOptions
-from nscan_cli.slam.backend.uneven_path_match import TimedPoints, UnevenPathMatch
+from nscan_cli.slam.backend.uneven_path_match import TimedPoints, match_uneven_path
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -133,7 +133,7 @@ class _Run:
         beside = len(self._moving.times[self._near]) - (self._rows[1] + 1 - self._rows[0])
         if beside < uneven.scans or len(seen.points) < uneven.min_points * sweeps:
             return False
-        self._knots, gain = UnevenPathMatch(self._reference(), seen, self._times, start, uneven).least()
+        self._knots, gain = match_uneven_path(self._reference(), seen, self._times, start, uneven)
         off = np.abs(self._knots - start)[:: uneven.parts]
         near = (off < uneven.max_sigmas * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
         return bool(near) and gain > uneven.min_gain * (len(start) - 1)

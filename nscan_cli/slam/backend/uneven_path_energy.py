@@ -88,10 +88,9 @@ def evaluate_uneven_path(
         for a in range(3):
             step[a] = knots[part + 1, a] - knots[part, a]
             pose[a] = knots[part, a] + after * step[a]
-        _seen_from_group(problem.points[begin:end], problem.shares[begin:end], after, step, pose[2], moved)
-        evaluate_energy(
-            problem.grid, problem.half, moved[: end - begin], pose, widening, 0.0, 0.0, stride, buffers, out
-        )
+        points, shares = problem.points[begin:end], problem.shares[begin:end]
+        count = _seen_from_group(points, shares, stride, after, step, pose[2], moved)
+        evaluate_energy(problem.grid, problem.half, moved[:count], pose, widening, 0.0, 0.0, 1, buffers, out)
         terms[FIT] += scale * out[0]
         first, second = starts[part], starts[part + 1]
         at = 4
@@ -119,23 +118,27 @@ def evaluate_uneven_path(
 
 @leaf_kernel
 def _seen_from_group(
-    points: Array, shares: Array, at: float, step: Array, heading: float, out: Array
-) -> None:
+    points: Array, shares: Array, stride: int, at: float, step: Array, heading: float, out: Array
+) -> int:
     """Write points (m, 2) from the pose of their group, at a share of the step (3,) of their part.
 
-    They were seen at the `shares` (m,) of it. Within a part the chord is as good as the arc.
+    They were seen at the `shares` (m,) of it. Of them one in `stride` is written; returns their number.
+    Within a part the chord is as good as the arc.
     """
     cos, sin = np.cos(heading), np.sin(heading)
     ahead, aside = cos * step[0] + sin * step[1], cos * step[1] - sin * step[0]
-    for k in range(points.shape[0]):
+    count = (points.shape[0] + stride - 1) // stride
+    for n in range(count):
+        k = n * stride
         share = shares[k] - at
         # The series are exact to 1e-12 at half a radian.
         turn = share * step[2]
         t = turn * turn
         c = 1.0 - t / 2.0 * (1.0 - t / 12.0 * (1.0 - t / 30.0 * (1.0 - t / 56.0 * (1.0 - t / 90.0))))
         s = turn * (1.0 - t / 6.0 * (1.0 - t / 20.0 * (1.0 - t / 42.0 * (1.0 - t / 72.0))))
-        out[k, 0] = c * points[k, 0] - s * points[k, 1] + share * ahead
-        out[k, 1] = s * points[k, 0] + c * points[k, 1] + share * aside
+        out[n, 0] = c * points[k, 0] - s * points[k, 1] + share * ahead
+        out[n, 1] = s * points[k, 0] + c * points[k, 1] + share * aside
+    return int(count)
 
 
 @leaf_kernel

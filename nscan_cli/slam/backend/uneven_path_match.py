@@ -45,42 +45,33 @@ class PathStages(NamedTuple):
     """(n,) one point in so many is matched."""
 
 
-class UnevenPathMatch:
-    """The match of what was seen along a path of K ≥ 3 knots (x, y, φ), with φ that does not jump by 2π."""
+def match_uneven_path(
+    reference: Ndt, seen: TimedPoints, times: Array, start: Array, options: UnevenMotionOptions
+) -> tuple[Array, float]:
+    """The knots (K, 3), at `times` (K,), s, between which points `seen` fit a reference best.
 
-    def __init__(
-        self, reference: Ndt, seen: TimedPoints, times: Array, start: Array, options: UnevenMotionOptions
-    ) -> None:
-        """Match points `seen` from the first to the last of `times` (K,), s, with a reference.
-
-        Of the knots `start` (K, 3) one in `options.parts` is a pose that is known.
-        """
-        seconds, groups = np.diff(times), options.groups
-        part = np.searchsorted(times, seen.times, side="right") - 1
-        shares = (seen.times - times[part]) / seconds[part]
-        group = groups * part + np.minimum((groups * shares).astype(np.int64), groups - 1)
-        ends = np.searchsorted(group, np.arange(groups * len(seconds) + 1))
-        sigmas = np.array([options.sigma, options.turn_sigma, options.speed_change, options.turn_change])
-        self._options, self._pattern = options, _band_pattern(len(times))
-        self._problem = UnevenPathProblem(
-            reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
-            options.scale, sigmas,
-        )  # fmt: skip
-
-    def least(self) -> tuple[Array, float]:
-        """The knots (K, 3) of least energy, and how much better the points fit there than at the start.
-
-        Each stage ends with a step that moves no knot by more than its tolerance.
-        """
-        knots, options = self._problem.start.copy(), self._options
-        coarse = len(options.widenings) - 1
-        stages = PathStages(
-            np.array(options.widenings),
-            np.array([options.coarse_tolerance] * coarse + [options.tolerance]),
-            np.array([options.coarse_stride] * coarse + [1]),
-        )
-        gain = _descend(self._problem, self._pattern, knots, stages, options.iterations)
-        return knots, gain
+    Also returns how much better they fit there than at the knots `start` (K, 3), K ≥ 3, whose φ does not jump
+    by 2π. One in `options.parts` of these is a pose that is known. Points are seen from the first to the last
+    of the times. Each stage ends with a step that moves no knot by more than its tolerance.
+    """
+    seconds, groups = np.diff(times), options.groups
+    part = np.searchsorted(times, seen.times, side="right") - 1
+    shares = (seen.times - times[part]) / seconds[part]
+    group = groups * part + np.minimum((groups * shares).astype(np.int64), groups - 1)
+    ends = np.searchsorted(group, np.arange(groups * len(seconds) + 1))
+    sigmas = np.array([options.sigma, options.turn_sigma, options.speed_change, options.turn_change])
+    problem = UnevenPathProblem(
+        reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
+        options.scale, sigmas,
+    )  # fmt: skip
+    knots, coarse = start.copy(), len(options.widenings) - 1
+    stages = PathStages(
+        np.array(options.widenings),
+        np.array([options.coarse_tolerance] * coarse + [options.tolerance]),
+        np.array([options.coarse_stride] * coarse + [1]),
+    )
+    gain = _descend(problem, _band_pattern(len(times)), knots, stages, options.iterations)
+    return knots, gain
 
 
 def _band_pattern(nodes: int) -> Pattern:
