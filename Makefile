@@ -59,6 +59,7 @@ soak: $(READY)
 	$(RUN)/python -m tests.soak --seconds 180 --runs 120
 	$(RUN)/python -m tests.soak.kills --kills 50
 	$(RUN)/python -m tests.soak.trouble
+	$(RUN)/python -m pytest -n 2 -m hypothesis --hypothesis-profile random
 
 lowest:
 	$(PYTHON) -m venv out/lowest

@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# No test looks at a clock: with the first example kernels may be compiled.
-settings.register_profile("no clock", deadline=None)
-settings.load_profile("no clock")
+# The suite draws the same examples in each run, `make soak` others. No test looks at a clock: with the first
+# example kernels may be compiled.
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.register_profile("random", deadline=None, max_examples=1000)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture(scope="session")

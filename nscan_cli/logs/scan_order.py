@@ -44,6 +44,9 @@ class ScanOrderOptions:
     min_regular_share: float = 0.8
     """A laser is read more often than it measures if at least this share of its scans are repeated equally
     often. A larger value leaves more repeated scans in the log."""
+    min_repeated_scans: int = 20
+    """And at least so many scans repeat the one before: fewer can by chance. A larger value finds it in
+    longer logs only."""
     longest_pause: float = 60.0
     """Longest pause between two files of one recording, s: a recorder that splits goes on at once. A larger
     value joins more files."""
@@ -75,8 +78,9 @@ def scans_by_time(
     laser, all of them equally often.
     """
     repeats = repeat_reading(ranges)
-    if not come_equally_often(repeats, options.min_regular_share):
-        rows = np.flatnonzero(repeats)
+    rows = np.flatnonzero(repeats)
+    is_rate = come_equally_often(repeats, options.min_regular_share)
+    if not is_rate or len(rows) < options.min_repeated_scans:
         repeats[rows] = [stamps[row] == stamps[row - 1] for row in rows.tolist()]
     if repeats.any():
         kept = np.flatnonzero(~repeats)

@@ -67,6 +67,8 @@ def in_one_unit(
     boundary = math.sqrt(float(np.median(near)) * float(np.median(far)))
     is_told_of = np.count_nonzero(is_told, axis=1) >= options.min_readings
     is_far = _as_before(_are_most(some > boundary, is_told, options), is_told_of)
+    if is_far.all() or not is_far.any():
+        return raw, []
     names = stretch_names((first, end - 1) for first, end in mask_runs(is_far))
     factor = float(np.median(far) / np.median(near))
     unit = _unit(some, is_told, is_far, factor, options)

@@ -98,6 +98,16 @@ def test_a_laser_that_is_covered_is_no_unit(read: Read):
     assert read(recording(ranges)).report.contradictions == ()
 
 
+def test_one_scan_beside_another_too_short_to_tell_is_no_stretch():
+    """Found by Hypothesis: all scans were then in the other unit, and no change was there to be judged."""
+    ranges = np.array([[1, 1, 1, 1, np.nan, np.nan], [1, 1, 100, 100, 100, 101]], dtype=np.float32)
+    order = by_time(["0", "1"])
+    raw = RawScans(ranges.copy(), np.full(2, FIRST), np.full(2, STEP), order.stamps, (0.0, 80.0))
+    found, said = in_one_unit(raw, order)
+    np.testing.assert_array_equal(found.ranges, ranges)
+    assert said == []
+
+
 def test_bounds_are_options():
     """With bounds that nothing fulfils nothing is found."""
     order = by_time([f"{0.1 * scan:.1f}" for scan in range(SCANS)])
