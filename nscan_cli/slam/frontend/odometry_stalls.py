@@ -6,6 +6,8 @@ end; where it lies in between is not known, and steady motion is the best guess.
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +16,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.poses import Array, Indices, Mask, relative
+
+DECIMALS = 9
+"""Of metres and rad, to which uneven steps are compared: the direction of time changes the last digits."""
 
 
 class OdometryStallOptions(NamedTuple):
@@ -130,7 +135,8 @@ def _stalls(
 def _uneven_steps(steps: OdometrySteps, options: OdometryStallOptions) -> list[tuple[int, int]]:
     """The rows between which some steps are too short and others too long.
 
-    The fewest steps count first, then the most uneven: so the direction of time does not matter.
+    The fewest steps count first, then the most uneven; of those that overlap and are as uneven, none. So the
+    direction of time does not matter.
     """
     candidates = []
     for count in range(2, min(options.most_uneven_steps, len(steps.sizes) - 2) + 1):
@@ -138,10 +144,12 @@ def _uneven_steps(steps: OdometrySteps, options: OdometryStallOptions) -> list[t
         candidates += [(count, -spreads[row], int(row) + 1) for row in np.flatnonzero(spreads)]
     is_taken = np.zeros(len(steps.sizes), dtype=np.bool_)
     found = []
-    for count, _, first in sorted(candidates):
-        if not is_taken[first : first + count].any():
-            is_taken[first : first + count] = True
-            found.append((first, first + count))
+    for (count, _), tied in groupby(sorted(candidates), itemgetter(0, 1)):
+        firsts = [first for _, _, first in tied if not is_taken[first : first + count].any()]
+        for first in firsts:
+            if all(abs(first - other) >= count for other in firsts if other != first):
+                is_taken[first : first + count] = True
+                found.append((first, first + count))
     return found
 
 
@@ -170,4 +178,4 @@ def _spreads(steps: OdometrySteps, count: int, options: OdometryStallOptions) ->
     is_steady &= (mean > beside / tolerated) & (mean < beside * tolerated)
     has_slow = (within.min(axis=1) < slower / options.uneven_factor) & (off.min(axis=1) < -options.min_motion)
     has_fast = (within.max(axis=1) > faster * options.uneven_factor) & (off.max(axis=1) > options.min_motion)
-    return np.where(is_steady & has_slow & has_fast, np.ptp(off, axis=1), 0.0)
+    return np.where(is_steady & has_slow & has_fast, np.ptp(off, axis=1).round(DECIMALS), 0.0)

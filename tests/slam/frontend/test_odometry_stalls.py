@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
@@ -154,6 +154,7 @@ def test_poses_with_wrong_stamps_on_a_steady_way_are_where_they_would_be(row, la
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 0.6), st.floats(-0.4, 0.4)), min_size=4, max_size=40))
+@example([(0.0, 0.375), (0.4375, 0.0), (0.0, 0.0), (0.5, 0.25), (0.4375, 0.0), (0.25, 0.125)])
 def test_the_direction_of_time_does_not_matter(steps):
     poses, times = driven(np.array([[step, 0.0, turn] for step, turn in steps]))
     evened, ends = without_stalls(poses, times, STALLS)
