@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask, compose, inverse, relative, wrap
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
@@ -49,9 +49,13 @@ def motion_from_behind(
     since = max(stretches[0][0] - 1, 0)
     behind = tracker.track(scans.part(since, count).backwards(known[since:]))
     inliers, poses, sigmas = behind.inliers[::-1], behind.poses[::-1], behind.weakest_sigmas[::-1]
+    from_front = found.part(since, count)
+    is_turn = _turns_from_front(from_front, inliers, sigmas, options)
+    poses = _with_steps(poses, from_front.poses, is_turn)
     # What scans tell from one side alone may be the ripple of their walls.
     tells = sigmas <= options.scan.degeneracy.trusted_sigma
-    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.weakest_sigmas[since:]))
+    sigmas = np.where(tells, sigmas, np.maximum(sigmas, from_front.weakest_sigmas))
+    sigmas = np.where(is_turn, from_front.weakest_sigmas, sigmas)
     motion = MotionFromBehind(np.full((count, 3), np.nan), np.zeros(count))
     for first, end in stretches:
         fits_better = inliers[first - since : end - since].mean() >= _better_share(
@@ -64,6 +68,29 @@ def motion_from_behind(
             motion.poses[whole] = poses[whole.start - since : whole.stop - since]
             motion.weakest_sigmas[whole] = sigmas[whole.start - since : whole.stop - since]
     return motion if np.isfinite(motion.poses).any() else None
+
+
+def _turns_from_front(found: TrackedScans, inliers: Array, sigmas: Array, options: TrackingOptions) -> Mask:
+    """(n,) to which scans the robot turned far, as they were `found` from the front.
+
+    A robot that turns round has hardly anything in view there that it sees before, or after. From behind
+    little was seen but walls ahead of it: a scan that fits no better, or does not tell its place, is wrong.
+    Then shares of inliers are `inliers` (n,), and standard deviations of places `sigmas` (n,), m.
+    """
+    trusted = options.scan.degeneracy.trusted_sigma
+    turns = np.append(False, np.abs(wrap(np.diff(found.poses[:, 2]))) > options.standstill_turn)
+    fits_as_well = found.inliers >= inliers - options.standstill_gain
+    believed: Mask = turns & (found.weakest_sigmas <= trusted) & (fits_as_well | (sigmas > trusted))
+    return believed
+
+
+def _with_steps(poses: Array, others: Array, chosen: Mask) -> Array:
+    """Poses (n, 3) to the `chosen` (n,) of which the robot came as it came to `others` (n, 3)."""
+    found = poses.copy()
+    for k in np.flatnonzero(chosen).tolist():
+        came = compose(found[k - 1], relative(others[k], others[k - 1]))
+        found[k:] = compose(compose(came, inverse(found[k])), found[k:])
+    return found
 
 
 def _better_share(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> float:

@@ -203,6 +203,9 @@ class TrackingOptions:
     standstill_gain: float = 0.03
     """From behind these scans must have a share of inliers that is larger by this. A larger value keeps more
     scans as they are."""
+    standstill_turn: float = 0.3
+    """Where the robot turns farther than this to a scan, rad, what was found from the front counts, unless
+    the scan fits clearly better from behind. A larger value believes turns from behind more often."""
     standstill_scans: int = 1024
     """Most scans without odometry that wait for one that tells its place. A larger number takes more time and
     memory in bare corridors."""

@@ -9,10 +9,12 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import log_from
+from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.consistency.repeated_maps import mirrored
 from nscan_cli.slam.diagnostics.notices import notices
+from tests.benchmarks.lasers import KINDS, NONE, recorded
 from tests.simulation.drive import Drive
 from tests.simulation.faults import taken
 from tests.simulation.laser import Laser
@@ -124,3 +126,14 @@ def test_where_neither_side_tells_the_way_a_notice_says_so(laser, speed):
     scans = int(np.argmax(recording.truth[::3, 0] > -1.0))
     assert way(found.graph.poses, scans) < way(recording.truth[::3], scans) - 1.0
     assert any("the walls do not show how far" in said for said in notices(found.state))
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_robot_that_turns_by_57_degrees_between_two_scans_turns_as_the_front_sees_it(seed):
+    """From behind it turned by 33° the other way, so that the corridor lay across."""
+    log, truth = recorded(KINDS[0], seed, NONE)
+    rows = np.arange(0, len(log), 5)
+    sparse = dataclasses.replace(excerpt(log, rows), odometry=None, odometry_path=None)
+    poses = mapped(sparse).graph.poses
+    off = relative(poses[1:], poses[:-1]) - relative(truth[rows[1:]], truth[rows[:-1]])
+    assert np.degrees(np.abs(wrap(off[:, 2])).max()) < 3.0
