@@ -22,6 +22,7 @@ from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
+from nscan_cli.logs.range_noise import noise_of_ranges
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -128,9 +129,8 @@ def laser_log(
             lost.counts["not a number"] = others
         lost.counts["of one value"] = of_one_value
     mark_no_returns(ranges, limits.low, limits.high)
-    rounded = rounding_of_ranges(ranges)
-    if rounded:
-        warnings.append(rounded)
+    inexact = rounding_of_ranges(ranges), noise_of_ranges(ranges, angle_increment[rows])
+    warnings += [text for text in inexact if text]
     warnings += blind_scans(ranges, numbers)
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:

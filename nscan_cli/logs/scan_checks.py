@@ -14,6 +14,7 @@ from nscan_cli.logs.heading_unit import HeadingUnitOptions
 from nscan_cli.logs.jittery_odometry import JitteryOdometryOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
+from nscan_cli.logs.range_noise import RangeNoiseOptions
 from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
@@ -57,6 +58,8 @@ class ScanCheckOptions:
     """Whether some scans are in another unit than the others."""
     rounded_ranges: RoundedRangeOptions = field(default_factory=RoundedRangeOptions)
     """Whether ranges were rounded."""
+    range_noise: RangeNoiseOptions = field(default_factory=RangeNoiseOptions)
+    """Whether ranges are noisy."""
     blind_scans: BlindScanOptions = field(default_factory=BlindScanOptions)
     """Scans that see nothing for long."""
     angle_unit: AngleUnitOptions = field(default_factory=AngleUnitOptions)

@@ -177,6 +177,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), "stands? for no reading"),
     ("20 % of the readings say 2 m", lambda log: faults.dust(log, 0.2, 2.0), "stands? for no reading"),
+    ("noise of 0.1 m on the ranges", lambda log: faults.noisy_ranges(log, 0.1), "beside each other scatter"),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
@@ -198,7 +199,7 @@ FAULTS_OF_REAL_LOGS = (
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth", "looks 90° left in the middle third", "beams wider by 10 %",
-    "20 % of the readings say 2 m",
+    "20 % of the readings say 2 m", "noise of 0.1 m on the ranges",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
 FAULTS_OUTDOORS = (

@@ -125,6 +125,12 @@ def ranges_rounded(log: LaserLog, step: float) -> LaserLog:
     return replace(log, ranges=np.float32(step) * np.round(log.ranges / np.float32(step)))
 
 
+def noisy_ranges(log: LaserLog, sigma: float, seed: int = 1) -> LaserLog:
+    """Noise of this standard deviation (m) on all ranges."""
+    noise = np.random.default_rng(seed).normal(0.0, sigma, log.ranges.shape)
+    return replace(log, ranges=np.maximum(log.ranges + noise, 0.0).astype(np.float32))
+
+
 def dust(log: LaserLog, share: float, reading: float) -> LaserLog:
     """A share of the beams, each by chance, ends at one reading (m)."""
     ranges = log.ranges.copy()
