@@ -25,12 +25,28 @@ def contradicts_map(scan: TrackedBatch, usual: float, options: BreakOptions) -> 
     return usual >= options.min_usual_inliers and drop >= options.min_inlier_drop
 
 
+def was_carried(scan: TrackedBatch, before: TrackedBatch, options: BreakOptions) -> bool:
+    """Whether a scan sees other things than the one `before`, though odometry stood meanwhile."""
+    if scan.scans.odometry is None or before.scans.odometry is None:
+        return False
+    step = relative(scan.scans.odometry[0], before.scans.odometry[0])
+    drop = float(before.tracked.inliers[0]) - float(scan.tracked.inliers[0])
+    # Without odometry a step is nan.
+    stood = np.hypot(step[0], step[1]) < options.stood and abs(step[2]) < options.stood
+    share = _share_alike(scan, before, options) if stood and drop >= options.min_inlier_drop else None
+    return share is not None and share < options.carried_similarity
+
+
 def sees_the_same(scan: TrackedBatch, seen: TrackedBatch, options: BreakOptions) -> bool:
     """Whether a scan sees what another, settled one saw."""
-    step = relative(seen.tracked.poses[0], scan.tracked.poses[0])
-    points, others = scan.scans.of(0), transform(step, seen.scans.of(0))
-    share = view_similarity(points, others, options.view)
+    share = _share_alike(scan, seen, options)
     return share is not None and share >= options.min_similarity
+
+
+def _share_alike(scan: TrackedBatch, seen: TrackedBatch, options: BreakOptions) -> float | None:
+    """The share of sectors in which the views of two scans are the same, where they were found."""
+    step = relative(seen.tracked.poses[0], scan.tracked.poses[0])
+    return view_similarity(scan.scans.of(0), transform(step, seen.scans.of(0)), options.view)
 
 
 def see_enough(batch: TrackedBatch, options: BreakOptions) -> NDArray[np.bool_]:

@@ -43,6 +43,12 @@ class BreakOptions:
     min_inlier_drop: float = 0.37
     """The first doubted scan has a share of inliers lower than the usual one by at least this. A larger value
     breaks less often: in sparse surroundings matches are poor now and then, and odometry goes on."""
+    stood: float = 0.05
+    """Odometry stood if its step is smaller, m and rad. A larger value breaks more often."""
+    carried_similarity: float = 0.4
+    """The track also breaks where odometry stood, the scan before fitted better by `min_inlier_drop`, and the
+    two views are the same in a smaller share of sectors, also where scans do not see clearly. A larger value
+    breaks more often."""
     bridged_distance: float = 2.0
     """A segment that begins farther away by odometry is no break, m: other things are in view there, and
     odometry bridges the way. A larger value breaks more often."""

@@ -25,6 +25,7 @@ from nscan_cli.slam.frontend.break_detection import (
     is_bridged_by_odometry,
     see_enough,
     sees_the_same,
+    was_carried,
 )
 from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.laser_view import laser_view
@@ -199,11 +200,12 @@ class SegmentTracker:
         usual = float(np.median(self._usual))
         # Without odometry nothing but the scans leads a tracker on that is lost.
         is_lost = not self._has_odometry and usual < self.options.scan.lost_inliers
-        if not (is_lost or contradicts_map(self._doubted[0], usual, self.breaking)):
-            return []
-        kept = self.tracker, self._origin, self._path
         last, first = self._last, self._doubted[0]
         assert last is not None
+        is_carried = was_carried(first, last, self.breaking)
+        if not (is_lost or is_carried or contradicts_map(first, usual, self.breaking)):
+            return []
+        kept = self.tracker, self._origin, self._path
         guess = origin = last.tracked.poses[0]
         if first.scans.odometry is not None and last.scans.odometry is not None:
             step = relative(first.scans.odometry[0], last.scans.odometry[0])
@@ -215,7 +217,9 @@ class SegmentTracker:
         unmatched, self._unmatched = self._unmatched, []
         segment = self._track(ScanBatch.together([scan.scans for scan in self._doubted]), may_wait=False)
         self._unmatched = unmatched
-        if np.median(segment.tracked.inliers[1:]) < self.breaking.poor_inliers:
+        inliers, before = segment.tracked.inliers[1:], [scan.tracked.inliers[0] for scan in self._doubted[1:]]
+        fits_together = np.median(inliers) >= self.breaking.poor_inliers
+        if not (fits_together or (is_carried and np.mean(inliers) > np.mean(before))):
             self.tracker, self._origin, self._path = kept
             return []
         self._restarts += kept[0].restarts

@@ -8,16 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
-from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
 from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.frontend.tracker import Tracker
+from nscan_cli.slam.options import SlamOptions
+from tests.benchmarks.lasers import HARD
 from tests.data import data_file
 from tests.logs.excerpts import excerpt
+from tests.simulation import faults
+from tests.simulation.drive import Odometry
+from tests.simulation.places import drive_through, grounds
 from tests.slam.keyframe_drives import round_scene
 from tests.slam.mapped_logs import mapped, sensed_in
 from tests.slam.trouble_cases import carried, standing
@@ -98,3 +104,26 @@ def test_matches_that_are_poor_throughout_break_no_track():
     follower = SegmentTracker(TrackingOptions(), sparse)
     found = follower.follow(scans()) + follower.finish()
     assert not any(batch.after_break for batch in found)
+
+
+def breaks_of(log: LaserLog) -> list[int]:
+    """The rows before which the track breaks."""
+    follower = tracker_of(log, SlamOptions())
+    found = follower.follow(sensed_in(log)) + follower.finish()
+    return [batch.scans.first for batch in found if batch.after_break]
+
+
+@pytest.mark.parametrize(("since", "until"), [(300, 314), (600, 605), (600, 614), (900, 906), (1500, 1506)])
+def test_a_robot_that_is_carried_outdoors_breaks_the_track(since, until):
+    """Where few scans fit well odometry was believed, and the map was 1.6 to 45 m off."""
+    log = read_log(str(data_file("fr-campus.log.gz")))
+    log = excerpt(log, slice(since - 100, until + 40))
+    assert breaks_of(log) == []
+    assert breaks_of(faults.carried(log, slice(100, 100 + until - since))) == [100]
+
+
+def test_so_on_simulated_grounds():
+    recording = drive_through(grounds(2), HARD[2].laser, HARD[2].how, Odometry(), 2)
+    log = excerpt(recording.log(), slice(400, 560))
+    assert breaks_of(log) == []
+    assert breaks_of(faults.carried(log, slice(100, 126))) == [100]
