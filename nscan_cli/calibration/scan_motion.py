@@ -111,13 +111,8 @@ class ScanMotion:
 
         None in doubt.
         """
-        twist = self.twist(row) if 0 < row < len(self.log) - 1 else None
-        return None if twist is None else self._moved(row, twist, sweep)
-
-    def _moved(self, row: int, twist: Array, sweep: float) -> Array | None:
-        """As `corrected`, by a known velocity (3,); None with too few points."""
-        scan = self._scan(row)
-        if scan is None:
+        scan, twist = self._scan(row), self.twist(row) if 0 < row < len(self.log) - 1 else None
+        if scan is None or twist is None:
             return None
         points = scan[0].copy()
         move_along_arc(points, scan[1] * sweep, twist, False)
@@ -128,24 +123,17 @@ class ScanMotion:
 
         None in doubt.
         """
-        both = self._on_both_sides(row)
-        if both is None:
+        before, at, after = (self.corrected(each, sweep) for each in (row - 1, row, row + 1))
+        twist = self.twist(row)
+        if before is None or at is None or after is None or twist is None:
             return None
-        before, after = both
-        twists = (before, 0.5 * (before + after), after)
-        scans = [self._moved(row + k - 1, twist, sweep) for k, twist in enumerate(twists)]
-        turn = 0.0
-        # These scans were matched for their velocities, too.
-        for k, velocity in enumerate(both):
-            reference, points = scans[k], scans[k + 1]
-            if reference is None or points is None:
-                return None
-            seconds = float(self.log.times[row + k] - self.log.times[row + k - 1])
-            end = match_scans(reference, points, velocity * seconds, self.steps.pair, is_near=True)
-            if not end.converged:
-                return None
-            turn += float(end.pose[2])
-        return turn
+        seconds = np.diff(self.log.times[row - 1 : row + 2]).tolist()
+        # Its twist was measured by matches of these scans.
+        ends = [
+            match_scans(reference, points, twist * time, self.steps.pair, is_near=True)
+            for reference, points, time in ((before, at, seconds[0]), (at, after, seconds[1]))
+        ]
+        return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
 
     def energies(self, one: int, other: int, sweeps: Sequence[float]) -> Array | None:
         """(T,) energy of two scans, per point, for each assumed time of a sweep (T,), s; None in doubt."""
