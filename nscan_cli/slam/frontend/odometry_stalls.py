@@ -17,7 +17,7 @@ from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.poses import Array, Indices, Mask, relative
 
-DECIMALS = 9
+STEP_DECIMALS = 9
 """Of metres and rad, to which uneven steps are compared: the direction of time changes the last digits."""
 
 
@@ -178,4 +178,4 @@ def _spreads(steps: OdometrySteps, count: int, options: OdometryStallOptions) ->
     is_steady &= (mean > beside / tolerated) & (mean < beside * tolerated)
     has_slow = (within.min(axis=1) < slower / options.uneven_factor) & (off.min(axis=1) < -options.min_motion)
     has_fast = (within.max(axis=1) > faster * options.uneven_factor) & (off.max(axis=1) > options.min_motion)
-    return np.where(is_steady & has_slow & has_fast, np.ptp(off, axis=1).round(DECIMALS), 0.0)
+    return np.where(is_steady & has_slow & has_fast, np.ptp(off, axis=1).round(STEP_DECIMALS), 0.0)
