@@ -49,6 +49,11 @@ class BreakOptions:
     """The track also breaks where odometry stood, the scan before fitted better by `min_inlier_drop`, and the
     two views are the same in a smaller share of sectors, also where scans do not see clearly. A larger value
     breaks more often."""
+    driven: float = 0.3
+    """So the track breaks only once odometry has driven this far, m: people about a robot that stands go
+    away. A larger value breaks less often."""
+    max_standing: int = 200
+    """Most scans that wait for that. A larger number takes more memory."""
     bridged_distance: float = 2.0
     """A segment that begins farther away by odometry is no break, m: other things are in view there, and
     odometry bridges the way. A larger value breaks more often."""

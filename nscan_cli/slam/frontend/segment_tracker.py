@@ -154,7 +154,27 @@ class SegmentTracker:
         assert self._last_seeing is not None
         if sees_the_same(scan, self._last_seeing, self.breaking):
             return self._settle_doubted()
-        return [] if may_wait else self._break_track_if_sure() or self._settle_doubted()
+        if may_wait:
+            return []
+        waits = (
+            self._seems_carried()
+            and not self._has_driven()
+            and len(self._doubted) < self.breaking.max_standing
+        )
+        if waits and len(self._doubted) > self.breaking.max_doubted + 1:
+            return []
+        return self._break_track_if_sure() or ([] if waits else self._settle_doubted())
+
+    def _seems_carried(self) -> bool:
+        """Whether the first of the doubted scans sees other things, though odometry stood."""
+        return self._last is not None and was_carried(self._doubted[0], self._last, self.breaking)
+
+    def _has_driven(self) -> bool:
+        """Whether the robot has driven on since, by odometry."""
+        first, newest = self._doubted[0].scans.odometry, self._doubted[-1].scans.odometry
+        if first is None or newest is None:
+            return False
+        return bool(np.hypot(*(newest[0] - first[0])[:2]) >= self.breaking.driven)
 
     def _settle_doubted(self) -> list[TrackedBatch]:
         scans, self._doubted = self._doubted, []
@@ -202,7 +222,7 @@ class SegmentTracker:
         is_lost = not self._has_odometry and usual < self.options.scan.lost_inliers
         last, first = self._last, self._doubted[0]
         assert last is not None
-        is_carried = was_carried(first, last, self.breaking)
+        is_carried = self._seems_carried() and self._has_driven()
         if not (is_lost or is_carried or contradicts_map(first, usual, self.breaking)):
             return []
         kept = self.tracker, self._origin, self._path

@@ -20,7 +20,7 @@ from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import HARD
 from tests.data import data_file
-from tests.logs.excerpts import excerpt
+from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation import faults
 from tests.simulation.drive import Odometry
 from tests.simulation.places import drive_through, grounds
@@ -127,3 +127,21 @@ def test_so_on_simulated_grounds():
     log = excerpt(recording.log(), slice(400, 560))
     assert breaks_of(log) == []
     assert breaks_of(faults.carried(log, slice(100, 126))) == [100]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_a_crowd_about_a_robot_that_stands_breaks_no_track(seed):
+    """It hides two thirds of the beams; nobody carries the robot, and scans do not fit together either."""
+    log = round_scene().record(5).log()
+    rows = np.concatenate([np.arange(200), np.full(80, 200), np.arange(200, len(log))])
+    times = np.median(np.diff(log.times)) * np.arange(len(rows))
+    log = replace(excerpt(log, rows), times=times, stamps=tuple(f"{time:.6f}" for time in times))
+    draw, walkers = np.random.default_rng(seed), np.empty((3 + 2 * seed, 4))
+    for walker in walkers:
+        angle, away = draw.uniform(0.0, 2.0 * np.pi), draw.uniform(0.5, 0.9)
+        walker[:2] = truth_of(log)[200, :2] + away * np.array([np.cos(angle), np.sin(angle)])
+        walker[2:] = walker[:2] + draw.normal(0.0, 1.2, 2)
+    ranges = log.ranges.copy()
+    ranges[210:270] = faults.people(log, walkers, speed=0.6).ranges[210:270]
+    assert np.mean(ranges[210:270] < log.ranges[210:270] - 0.1) > 0.5
+    assert breaks_of(replace(log, ranges=ranges)) == []
