@@ -237,9 +237,9 @@ class SegmentTracker:
         unmatched, self._unmatched = self._unmatched, []
         segment = self._track(ScanBatch.together([scan.scans for scan in self._doubted]), may_wait=False)
         self._unmatched = unmatched
-        inliers, before = segment.tracked.inliers[1:], [scan.tracked.inliers[0] for scan in self._doubted[1:]]
+        inliers, in_map = segment.tracked.inliers[1:], [scan.tracked.inliers[0] for scan in self._doubted[1:]]
         fits_together = np.median(inliers) >= self.breaking.poor_inliers
-        if not (fits_together or (is_carried and np.mean(inliers) > np.mean(before))):
+        if not (fits_together or (is_carried and np.mean(inliers) > np.mean(in_map))):
             self.tracker, self._origin, self._path = kept
             return []
         self._restarts += kept[0].restarts
