@@ -14,7 +14,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.backend.contradicting_visits import worst_violation
 from nscan_cli.slam.backend.degenerate_relations import all_widened_relations, degenerate_stretches
-from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
+from nscan_cli.slam.diagnostics.odometry_disagreement import carried_scans, odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
 from nscan_cli.slam.loop_closure.free_space_violations import is_sound, sound_share
@@ -86,6 +86,13 @@ def _odometry_notices(state: SlamState) -> list[str]:
         found.append(
             f"scans are missing before {_numbered(log, gaps)}: "
             f"by odometry the robot moved more than {far:g} m or {turned:g} rad there"
+        )
+    moved = carried_scans(np.concatenate(state.tracked), odometry, state.options.diagnostics.odometry)
+    carried = np.setdiff1d(moved, [*state.breaks, *state.odometry_jumps]).tolist()
+    if carried:
+        found.append(
+            f"odometry stands at {_numbered(log, carried)}, but the scans see another place: the robot was "
+            "carried, or odometry is wrong there; how far it moved is taken from the scans"
         )
     apart = odometry_disagreements(
         route.rows, route.poses, odometry, state.breaks, state.options.diagnostics.odometry

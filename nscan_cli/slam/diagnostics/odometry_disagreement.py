@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.poses import Array, Indices, are_known
+from nscan_cli.poses import Array, Indices, Mask, are_known, relative
 from nscan_cli.slam.diagnostics.options import OdometryDisagreementOptions
 
 
@@ -66,3 +66,16 @@ def odometry_disagreements(
         lengths = np.linalg.norm(np.diff(tracks[:, ends], axis=1), axis=2).sum(axis=1)
         found.append(OdometryDisagreement(int(rows[first]), int(rows[last]), *lengths.tolist()))
     return found
+
+
+def carried_scans(poses: Array, odometry: Array, options: OdometryDisagreementOptions) -> Indices:
+    """The scans to which the robot moved while odometry stood: rows of poses (S, 3) and odometry (S, 3)."""
+    moved, by_odometry = relative(poses[1:], poses[:-1]), relative(odometry[1:], odometry[:-1])
+    stood = are_known(by_odometry) & ~_longer(by_odometry, options.stood)
+    return np.flatnonzero(stood & _longer(moved, options.carried)) + 1
+
+
+def _longer(steps: Array, than: float) -> Mask:
+    """Which steps (n, 3) are longer than some distance, m, or turn by more, rad."""
+    longer: Mask = (np.hypot(steps[:, 0], steps[:, 1]) > than) | (np.abs(steps[:, 2]) > than)
+    return longer

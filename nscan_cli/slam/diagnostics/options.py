@@ -14,6 +14,10 @@ class OdometryDisagreementOptions:
     max_share: float = 0.4
     """Largest difference of the distances, as a share of the path. For sound odometry it is little more than
     half of this, with disturbed steps too. A larger value warns less."""
+    stood: float = 0.05
+    """Odometry stands if its step is smaller, m and rad. A larger value warns more."""
+    carried: float = 0.5
+    """The robot is carried if it moves farther than this meanwhile, m or rad. A larger value warns less."""
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import numpy as np
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.motion_model import Prior, prior_value
-from nscan_cli.matching.pose_kernels import wrapped
+from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.constant_velocity import expected_errors
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import RESTARTS, TrackingProblem, TrackState
+from nscan_cli.slam.frontend.track_state import HAS_LEFT, RESTARTS, TrackingProblem, TrackState
 
 
 @kernel
@@ -31,6 +31,21 @@ def restart_threshold(track: TrackState, options: ScanTrackingOptions) -> float:
         return max(options.restart_inliers, before - options.inlier_margin)
     is_clear = before > options.clear_inliers
     return max(options.restart_inliers, before - options.clear_inlier_drop if is_clear else 0.0)
+
+
+@kernel
+def lost_threshold(track: TrackState, options: ScanTrackingOptions, odometry: Array) -> float:
+    """The share of inliers below which the next scan, at `odometry` (3,), is searched.
+
+    More are searched where nothing else tells the way, where the scan before has just left the odometry, and
+    where the odometry stands though other things come into view.
+    """
+    if not np.isfinite(odometry[0]) or track.counts[HAS_LEFT]:
+        return options.restart_inliers
+    step = np.full(3, np.nan)
+    relative_pose(odometry, track.odometry, step)
+    stands = np.hypot(step[0], step[1]) < options.min_motion and abs(wrapped(step[2])) < options.min_motion
+    return max(options.lost_inliers, track.inliers[0] - options.carried_drop if stands else 0.0)
 
 
 @kernel

@@ -80,6 +80,9 @@ class ScanTrackingOptions(NamedTuple):
     """With a smaller share of inliers a scan with odometry is searched among the last ones; without odometry
     `restart_inliers` decides. It is also the least score of a place that the search finds. A larger value
     searches more and accepts less."""
+    carried_drop: float = 0.37
+    """Where odometry stands, a scan with a share of inliers that is smaller by this than that of the scan
+    before is searched too: the robot may be carried. A larger value searches less."""
     match_motion: float = 0.1
     """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
     the last one that was. The scans between follow. Larger values drift less and see less."""
@@ -128,6 +131,9 @@ class ScanTrackingOptions(NamedTuple):
     max_odometry_surprise: float = 25.0
     """Most that the objective of a poor match grows because it is off trusted odometry, which drives on: now
     and then a wheel slips. A larger value trusts the odometry more."""
+    max_carried_surprise: float = 10.0
+    """The same where odometry stands, for places that only a robot that is carried comes to. A larger value
+    trusts the odometry more."""
     believed_contradictions: int = 1
     """If more successive scans than this contradict odometry, leaving it costs nothing. A larger value trusts
     the odometry longer."""
@@ -175,6 +181,8 @@ class TrackingOptions:
     help. More take longer."""
     lost_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
     """The search for a lost scan, around its prediction."""
+    carried_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=12.0, turn=1.5))
+    """The search for a scan that differs from the one before though odometry stands."""
     lost_search_path: float = 5.0
     """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
     clear_score: float = 0.25

@@ -15,10 +15,10 @@ from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
 from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 
-KNOWN, RESTARTS, NEXT, CONTRADICTIONS = 0, 1, 2, 3
+KNOWN, RESTARTS, NEXT, CONTRADICTIONS, HAS_LEFT, MAY_WAIT = 0, 1, 2, 3, 4, 5
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
-from other angles, the first scan of a batch whose pose is not known, and how many of the last scans left the
-odometry."""
+from other angles, the first scan of a batch whose pose is not known, how many of the last scans left the
+odometry, whether the last one did for a place that a search found, and whether a lost one may wait."""
 
 
 class TrackState(NamedTuple):
@@ -42,7 +42,7 @@ class TrackState(NamedTuple):
     last 1 to h − 1 steps, per scan and per second."""
     odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
-    """(4,) KNOWN, RESTARTS, NEXT and CONTRADICTIONS"""
+    """(6,) KNOWN, RESTARTS, NEXT, CONTRADICTIONS, HAS_LEFT and MAY_WAIT"""
     map: LocalMap
 
     @classmethod
@@ -50,7 +50,7 @@ class TrackState(NamedTuple):
         """The state before the first scan, with room for the last `size` poses."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
         inliers = np.array([0.0, np.inf])
-        deviation, counts = np.array([options.degeneracy.initial_sigma**2]), np.zeros(4, dtype=np.int64)
+        deviation, counts = np.array([options.degeneracy.initial_sigma**2]), np.zeros(6, dtype=np.int64)
         noise, empty = OdometryNoise.begin(), LocalMap.empty()
         errors = np.full((2, 2, size - 1), options.initial_prediction_error)
         return cls(

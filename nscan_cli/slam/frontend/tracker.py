@@ -12,7 +12,7 @@ from nscan_cli.matching.correlative_search import FoundPose, Search, likelihood_
 from nscan_cli.matching.motion_model import Prior, no_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, are_known, relative, wrap
 from nscan_cli.slam.frontend.constant_velocity import expected_errors
 from nscan_cli.slam.frontend.laser_view import points_in_view
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan, remove_newest
@@ -21,7 +21,15 @@ from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, Tracking
 from nscan_cli.slam.frontend.point_spacing import points_between
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackingProblem, TrackState
+from nscan_cli.slam.frontend.track_state import (
+    HAS_LEFT,
+    KNOWN,
+    MAY_WAIT,
+    NEXT,
+    RESTARTS,
+    TrackingProblem,
+    TrackState,
+)
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import track_scans
 
@@ -80,7 +88,13 @@ class Tracker:
                 self._keep(found, begun)
             if k == n or np.isnan(found.inliers[k]):
                 continue
-            is_clear = self._search(scans.of(k), found, k)
+            has_left = self._leave_odometry(scans.of(k), odometry[k], found, k)
+            if self._track.counts[MAY_WAIT] and not has_left:
+                k += 1
+                continue
+            has_few = found.inliers[k] < self.options.scan.lost_inliers
+            is_searched = not has_left and (has_few or not are_known(odometry[k]))
+            is_clear = is_searched and self._search(scans.of(k), found, k)
             has_few = found.inliers[k] < self.options.scan.lost_inliers
             is_lost = self._settings.is_alone and has_few and not is_clear
             if is_lost and self._left_out is not None and not self._is_tried:
@@ -163,6 +177,44 @@ class Tracker:
             found.poses[k], found.hessians[k] = pose, hessian
         return is_clear
 
+    def _leave_odometry(self, points: Array, odometry: Array, found: TrackedScans, k: int) -> bool:
+        """Whether scan k fits far better where odometry excludes it, and nowhere else; it is there then.
+
+        Odometry that stands does so, too, where the robot is carried: it may be farther off then, and costs
+        less. People about a robot that stands make it seem to be a little beside its place.
+        """
+        self._track.counts[HAS_LEFT] = 0
+        if not (len(points) and are_known(odometry) and are_known(self._track.odometry)):
+            return False
+        options, scan = self.options, self.options.scan
+        step = relative(odometry, self._track.odometry)
+        stands = np.hypot(step[0], step[1]) < scan.min_motion and abs(step[2]) < scan.min_motion
+        around = options.carried_search if stands else options.lost_search
+        cloud = self._track.map.recent_points(scan.window if stands else options.lost_search_path)
+        if not len(cloud):
+            return False
+        search = Search(likelihood_field(cloud, around), points, self._prior.mean, around)
+        place = search.best(scan.lost_inliers if stands else scan.restart_inliers)
+        if place is None or self._fits_elsewhere(search, place):
+            return False
+        self.searches += 1
+        pose, hessian = place.pose.copy(), np.empty((3, 3))
+        information = np.diag(np.array([around.distance, around.distance, around.turn]) ** -2.0)
+        prior = Prior(place.pose, information)
+        in_view = points_in_view(self._track, self._settings, points, prior.mean)
+        value, inliers = match_and_count(self.map.grid, self._settings, in_view, prior, pose, hessian)
+        is_far = np.hypot(*(pose - self._prior.mean)[:2]) > options.lost_search.distance
+        most = scan.max_carried_surprise if stands and is_far else scan.max_odometry_surprise
+        price = min(_cost(self._prior, pose), most)
+        has_more = inliers > found.inliers[k] + scan.inlier_margin
+        if not has_more or value - _cost(prior, pose) + price >= found.values[k]:
+            return False
+        found.values[k], found.inliers[k] = value, inliers
+        found.poses[k], found.hessians[k] = pose, hessian
+        self._prior.information[:] = information
+        self._track.counts[HAS_LEFT] = 1
+        return True
+
     def _is_clear(self, search: Search, place: FoundPose) -> bool:
         """Whether a lost scan fits in no other place nearly as well, and the robot may have come there."""
         options, known = self.options, self._track.poses[-int(self._track.counts[KNOWN]) :, :2]
@@ -170,5 +222,16 @@ class Tracker:
         farthest = options.lost_steps * longest * (1 + self._lost_count)
         if np.hypot(*(place.pose - self._prior.mean)[:2]) > farthest:
             return False
-        second = options.clear_score_ratio * place.score
-        return search.best(second, (place.pose, options.clear_score_distance)) is None
+        return not self._fits_elsewhere(search, place)
+
+    def _fits_elsewhere(self, search: Search, place: FoundPose) -> bool:
+        """Whether there is another place that is nearly as good."""
+        second = self.options.clear_score_ratio * place.score
+        return search.best(second, (place.pose, self.options.clear_score_distance)) is not None
+
+
+def _cost(prior: Prior, pose: Array) -> float:
+    """What a prior adds to the objective at a pose (3,)."""
+    off = pose - prior.mean
+    off[2] = wrap(off[2])
+    return float(0.5 * off @ prior.information @ off)

@@ -17,6 +17,7 @@ from nscan_cli.slam.frontend.deskewing import deskew_by_last_step, deskew_by_mat
 from nscan_cli.slam.frontend.laser_view import match_again_in_sector, match_in_sector, points_in_view
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.match_restarts import (
+    lost_threshold,
     match_from_other_angles,
     match_near_prediction,
     restart_threshold,
@@ -29,7 +30,14 @@ from nscan_cli.slam.frontend.prediction import (
     predict_prior_steadily,
 )
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
-from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT, TrackingProblem
+from nscan_cli.slam.frontend.track_state import (
+    CONTRADICTIONS,
+    HAS_LEFT,
+    KNOWN,
+    MAY_WAIT,
+    NEXT,
+    TrackingProblem,
+)
 
 
 @kernel
@@ -181,12 +189,17 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
                 match_from_other_angles(problem, matched, threshold, k)
                 if settings.is_alone:
                     match_near_prediction(problem, matched, k)
-            if waits_for_motion(track, options, odometry, k, found.poses[k], may_wait):
-                if found.inliers[k] < threshold and track.inliers[1] == np.inf:
-                    track.inliers[1] = found.inliers[k]
-                continue
-            if found.inliers[k] < (options.lost_inliers if has_odometry else options.restart_inliers):
+            least = lost_threshold(track, options, odometry[k])
+            # Odometry stands where the robot is carried. What is in vain for one scan is so for the next.
+            is_lost = found.inliers[k] < least <= min(track.inliers[0], track.inliers[1])
+            waits = waits_for_motion(track, options, odometry, k, found.poses[k], may_wait)
+            if waits and found.inliers[k] < threshold and track.inliers[1] == np.inf:
+                track.inliers[1] = found.inliers[k]
+            track.counts[MAY_WAIT] = waits
+            if is_lost or (found.inliers[k] < least and not waits):
                 return k
+            if waits:
+                continue
             if matched.shape[0] == in_view.shape[0]:
                 matched = match_again_in_sector(problem, in_view, k)
             if track.counts[KNOWN] >= options.degeneracy_poses and not has_odometry:
@@ -194,6 +207,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
                 predict_prior_steadily(track, options, problem.times[k], prior)
                 found.values[k] += prior_value(prior, found.poses[k])
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
+            track.counts[HAS_LEFT] = 0
         _settle(problem, k)
         if is_matched:
             return k + 1

@@ -113,7 +113,7 @@ def breaks_of(log: LaserLog) -> list[int]:
     return [batch.scans.first for batch in found if batch.after_break]
 
 
-@pytest.mark.parametrize(("since", "until"), [(300, 314), (600, 605), (600, 614), (900, 906), (1500, 1506)])
+@pytest.mark.parametrize(("since", "until"), [(300, 314), (600, 614), (900, 906)])
 def test_a_robot_that_is_carried_outdoors_breaks_the_track(since, until):
     """Where few scans fit well odometry was believed, and the map was 1.6 to 45 m off."""
     log = read_log(str(data_file("fr-campus.log.gz")))
