@@ -10,6 +10,7 @@ from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visit
 from nscan_cli.slam.backend.final_deskewing import deskew_by_final_path
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
+from nscan_cli.slam.backend.odometry_over_breaks import believe_odometry_over_breaks
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
@@ -55,6 +56,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     deskew_by_final_path(state)
     refine(state)
     mend_contradicting_visits(state)
+    believe_odometry_over_breaks(state)
     return finish_graph(state)
 
 

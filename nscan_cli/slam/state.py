@@ -62,6 +62,8 @@ class SlamState:
     """Rows of the keyframes before which the track broke, increasing."""
     matched_pairs: list[Pairwise] = field(default_factory=list)
     """Pairwise relations of matches between a keyframe and one neighbour."""
+    odometry_relations: list[Pairwise] = field(default_factory=list)
+    """What odometry says over breaks of the track, where loops agree with it."""
     nscan_relations: list[NScan] = field(default_factory=list)
     other_relations: list[Relation] = field(default_factory=list)
     """Relations of a saved graph that the loop does not make."""
@@ -132,12 +134,13 @@ class SlamState:
 
     @property
     def pairwise_relations(self) -> list[Pairwise]:
-        """The chain, or what of it the options keep, and the matched pairs."""
+        """The chain, or what of it the options keep, the matched pairs, and odometry over breaks."""
         chain = self.route.chain[: max(len(self.poses) - 1, 0)]
         if self.options.relations != "nscan":
-            return [*chain, *self.matched_pairs]
+            return [*chain, *self.matched_pairs, *self.odometry_relations]
         joined = {pair for relation in self.nscan_relations for pair in itertools.pairwise(relation.nodes)}
-        return [relation for relation in chain if relation.nodes not in joined]
+        kept = [relation for relation in chain if relation.nodes not in joined]
+        return [*kept, *self.odometry_relations]
 
     def loop_relations(self) -> list[Relation]:
         """The relations that close loops."""

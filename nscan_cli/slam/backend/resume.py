@@ -20,6 +20,7 @@ from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.final_deskewing import add_keyframes_at, tracked_at
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
+from nscan_cli.slam.backend.odometry_over_breaks import believe_odometry_over_breaks
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
@@ -68,6 +69,7 @@ def resume(graph: Graph, log: LaserLog, rows: Indices, threads: int = 1) -> Grap
     state = state_of_graph(graph, log, options_of(graph), threads)
     reject_contradicting_loops(state)
     refine(state, search=False)
+    believe_odometry_over_breaks(state)
     refined = finish_graph(state)
     refined.loops += [loop for loop in graph.loops if loop.reason in SEARCH_VERDICTS]
     refined.provenance = graph.provenance
@@ -82,13 +84,15 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
     add_keyframes_at(state, found, graph.anchors == np.arange(len(log)), breaks)
     chain = _chain_of_graph(graph, options)
     in_chain = {id(relation) for relation in chain}
+    matched = [pair for pair in graph.pairwise if id(pair) not in in_chain]
     return dataclasses.replace(
         state,
         route=route_of(state.keyframes.list, chain, graph.poses[graph.keyframes]),
         chain=chain,
         tracked=[graph.poses],
         breaks=sorted(breaks),
-        matched_pairs=[pair for pair in graph.pairwise if id(pair) not in in_chain],
+        matched_pairs=[pair for pair in matched if pair.origin != "odometry"],
+        odometry_relations=[pair for pair in matched if pair.origin == "odometry"],
         nscan_relations=list(graph.nscan),
         other_relations=list(graph.others),
         loops=[loop for loop in graph.loops if loop.reason not in SEARCH_VERDICTS],

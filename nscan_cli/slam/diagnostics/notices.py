@@ -30,9 +30,13 @@ def notices(state: SlamState, companions_checked: bool = False) -> list[str]:
     `companions_checked`: whether what goes along with the robot was looked for before the log was mapped.
     """
     log, found = state.log, []
-    if state.breaks:
+    confirmed = [relation.nodes[1] for relation in state.odometry_relations]
+    unknown = [row for row in state.breaks if row not in confirmed]
+    if unknown:
+        found.append(f"tracking broke at {_numbered(log, unknown)}; how the robot moved there is unknown")
+    if confirmed:
         found.append(
-            f"tracking broke at {_numbered(log, state.breaks)}; how the robot moved there is unknown"
+            f"tracking broke at {_numbered(log, confirmed)}; odometry and loops agree how it moved there"
         )
     jumps = state.odometry_jumps.tolist()
     found += _drives(state, jumps)
