@@ -59,6 +59,7 @@ TOLD = {
     "do not see what": "scans see other things",
     "pass through": "places look different",
     "the scans jump": "the scans jump",
+    "the robot was carried, or odometry": "the robot was carried",
     "it is frozen, or": "the laser hangs, or the robot stands",
 }
 """Words of a notice → what the table says of it."""
