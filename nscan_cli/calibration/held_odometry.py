@@ -16,7 +16,7 @@ from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, Indices, relative
+from nscan_cli.poses import Indices, relative
 
 
 def checked_held(
@@ -95,16 +95,15 @@ def _scans_move(
 def _scans_turn(
     log: LaserLog, first: int, last: int, options: HeldOdometryOptions, steps: StepOptions
 ) -> bool:
-    """Whether a few of some steps, spread over a stretch, have a clear turn."""
-
-    def are_enough(turns: Array) -> bool:
-        return bool(np.count_nonzero(np.abs(turns) >= options.min_turn) >= options.min_measured)
-
-    rows = _rows_within(log, first, last, options.more_steps, steps)
-    # On straight ways a rough look is enough.
-    return are_enough(scan_turns(log, *rows, options.scan_turns)) and are_enough(
-        measure_steps(log, rows, steps).laser[:, 2]
-    )
+    """Whether a few of many steps, spread over a stretch, have a clear turn."""
+    # A rough look costs next to nothing, and on long straight ways hardly a step has one.
+    begins, ends = _rows_within(log, first, last, options.rough_steps, steps)
+    turns = np.flatnonzero(np.abs(scan_turns(log, begins, ends, options.scan_turns)) >= options.min_turn)
+    if len(turns) < options.min_measured:
+        return False
+    chosen = turns[np.unique(np.linspace(0, len(turns) - 1, options.more_steps).astype(np.int64))]
+    measured = measure_steps(log, (begins[chosen], ends[chosen]), steps).laser[:, 2]
+    return bool(np.count_nonzero(np.abs(measured) >= options.min_turn) >= options.min_measured)
 
 
 def _rows_within(

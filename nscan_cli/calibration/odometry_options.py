@@ -222,6 +222,8 @@ class HeldOdometryOptions:
     """Number of steps that are measured, spread over that time. More tell more and take longer."""
     more_steps: int = 28
     """Number of steps where these tell too little, as outdoors or in stop and go. More take longer."""
+    rough_steps: int = 400
+    """Number of steps that are looked at for turns. More find more."""
     min_measured: int = 3
     """Least number of steps that the scans measure. A larger value finds less."""
     standing_share: float = 0.3

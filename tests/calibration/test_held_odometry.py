@@ -52,7 +52,9 @@ def test_no_real_odometry_stands(name):
 
 
 @pytest.mark.logs
-@pytest.mark.parametrize("name", ["mit-csail.log.gz", "field/urg-corridor-1.bag"])
+@pytest.mark.parametrize(
+    "name", ["mit-csail.log.gz", "mit-killian.log.gz", "fr-clinic.log.gz", "field/urg-corridor-1.bag"]
+)
 def test_a_gyroscope_that_fails_is_found_in_a_real_log(name):
     log = replace(read_log(str(data_file(name))), odometry_path=None)
     rows = slice(len(log) // 2, None)
