@@ -5,6 +5,7 @@ If encoders fail and a gyroscope goes on, the position alone stands; the other w
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Indices, relative
+from nscan_cli.poses import Array, Indices, relative, wrap
 
 
 def checked_held(
@@ -31,7 +32,8 @@ def checked_held(
         f"odometry stands still while the scans move, from scan {names}: it is not used "
         "there, and steady motion takes its place; --as-recorded uses it as it is"
     )
-    return without_held(log, held), [message]
+    log = without_held(log, held)
+    return with_turned_headings(log, [last + 1 for _, last in held], options), [message]
 
 
 def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptions) -> list[tuple[int, int]]:
@@ -65,6 +67,40 @@ def without_held(log: LaserLog, stretches: list[tuple[int, int]]) -> LaserLog:
     # What was recorded between the scans stands still as well.
     path = None if log.odometry_path is None else robot_path(log.times, odometry)
     return replace(log, odometry=odometry, odometry_path=path)
+
+
+def with_turned_headings(log: LaserLog, begins: list[int], options: HeldOdometryOptions) -> LaserLog:
+    """The log with headings that fit the positions again where odometry `begins` anew, at these rows.
+
+    A heading that stood has lost the turns, but positions may have gone on. Robots drive the way that they
+    head, or always some other way. Where they do not, nothing is changed.
+    """
+    if log.odometry is None:
+        return log
+    odometry = log.odometry.copy()
+    for begin, end in itertools.pairwise([*begins, len(log)]):
+        before, behind = (
+            _usual_heading(odometry[rows], options) for rows in (slice(0, begin), slice(begin, end))
+        )
+        turn = float(wrap(behind - before))
+        if abs(turn) > options.min_lost_turn:
+            odometry[begin:, 2] += turn
+    if np.array_equal(odometry, log.odometry, equal_nan=True):
+        return log
+    path = None if log.odometry_path is None else robot_path(log.times, odometry)
+    return replace(log, odometry=odometry, odometry_path=path)
+
+
+def _usual_heading(odometry: Array, options: HeldOdometryOptions) -> float:
+    """The way that the robot drives, in its own frame, rad; nan if there is no such one."""
+    steps = relative(odometry[1:], odometry[:-1])
+    moves = np.hypot(steps[:, 0], steps[:, 1]) > options.min_driven
+    if np.count_nonzero(moves) < options.min_driven_steps:
+        return np.nan
+    angles = np.arctan2(steps[moves, 1], steps[moves, 0])
+    mean = np.array([np.cos(angles).mean(), np.sin(angles).mean()])
+    is_one = float(np.hypot(*mean)) >= options.min_agreement
+    return float(np.arctan2(mean[1], mean[0])) if is_one else np.nan
 
 
 def _scans_move(

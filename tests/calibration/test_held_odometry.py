@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.held_odometry import held_stretches
+from nscan_cli.calibration.held_odometry import checked_held, held_stretches
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
+from nscan_cli.poses import wrap
 from tests.data import OFFICE_LOG, data_file
 from tests.simulation import odometry_faults
 
@@ -34,6 +35,24 @@ def test_a_part_of_odometry_that_stands_is_found(part):
     ((first, last),) = stretches(odometry_faults.partly_held(drive(), rows, part))
     assert abs(first - rows.start) <= 1
     assert abs(last - rows.stop) <= 2
+
+
+@pytest.mark.parametrize("part", [POSITION, HEADING])
+def test_headings_that_have_lost_turns_are_turned_to_the_way_that_the_robot_drives(part):
+    """Without that the laser seemed to look elsewhere from there on."""
+    log, options = drive(), FileCheckOptions()
+    assert log.odometry is not None
+    rows = slice(len(log) // 4, len(log) // 2 + 40)
+    faulty = odometry_faults.partly_held(log, rows, part)
+    checked, said = checked_held(faulty, options.held, options.steps)
+    assert len(said) == 1
+    assert faulty.odometry is not None
+    assert checked.odometry is not None
+    behind = slice(rows.stop + 2, None)
+    lost = float(wrap(faulty.odometry[-1, 2] - log.odometry[-1, 2]))
+    turned = wrap(checked.odometry[behind, 2] - faulty.odometry[behind, 2])
+    np.testing.assert_allclose(turned, wrap(-lost), atol=0.03)
+    assert (abs(lost) > 0.5) == (part == HEADING)
 
 
 def test_a_robot_that_turns_on_the_spot_holds_its_position():
