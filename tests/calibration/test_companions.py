@@ -11,6 +11,7 @@ import pytest
 
 from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.companions import find_companion
+from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
@@ -18,7 +19,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import wrap
 from nscan_cli.slam.diagnostics.notices import notices
-from tests.data import data_file
+from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import truth_of
 from tests.simulation import faults, odometry_faults
 from tests.simulation.laser import Laser
@@ -109,6 +110,16 @@ def test_odometry_is_not_blamed_for_somebody_who_leads():
     assert message.startswith("something goes along with the robot")
     assert checked.log.odometry is log.odometry
     assert checked.companions_checked
+
+
+def test_nor_if_he_is_so_near_that_most_steps_by_scans_are_his():
+    """They contradict odometry, which agrees with the scans without his beams."""
+    log = faults.leader(read_log(str(OFFICE_LOG)), 0.4)
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
+    (message,) = checked.messages
+    assert message.startswith("something goes along with the robot")
+    assert checked.log.odometry is log.odometry
+    assert find_contradictions(log, ReadingOptions(), FileCheckOptions(), {})
 
 
 def test_dust_is_everywhere():
