@@ -79,7 +79,9 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     Raises InputDataError if it has no odometry, or its scans tell too little.
     """
     if log.odometry is None:
-        raise InputDataError(log.source.name, "has no odometry to calibrate", "give a log that has it")
+        why = [text for text in log.report.notices() if "odometry" in text or "clock" in text]
+        remedy = "; ".join(why) or "give a log that has it"
+        raise InputDataError(log.source.name, "has no odometry to calibrate", remedy)
     sweep = calibrated_sweep(log, options)
     # What a scan tells is where the robot is at its middle beam.
     log = sweep.log.at_middle_of_sweeps()

@@ -153,6 +153,7 @@ class _Calibrated:
             ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
             ("unknown", _unknown(self.calibration) or ["nothing"]),
             ("options", [flags or "none: the file agrees with the scans"]),
+            ("warnings", self.scans.report.notices()),
         ]  # fmt: skip
 
     def facts(self) -> dict[str, Any]:
@@ -174,6 +175,7 @@ class _Calibrated:
             "values": {name: _value_facts(name, estimate) for name, estimate in found.values.items()},
             "open": found.open,
             "options": robot_table(self.calibrated),
+            "warnings": self.scans.report.notices(),
             "laser": self.scans.laser,
             "file": self.scans.source.name,
             "sha256": self.scans.source.sha256,

@@ -34,6 +34,7 @@ def test_json(capsys):
         "values",
         "open",
         "options",
+        "warnings",
         "laser",
         "file",
         "sha256",
@@ -158,3 +159,17 @@ def test_a_log_without_odometry_is_told(command, tmp_path, capsys):
     code = run([command, CORRIDOR_LOG, "--no-odometry", *arguments])
     assert code == (65 if command == "calibrate" else 0)
     assert "has no odometry to calibrate; give a log that has it" in capsys.readouterr().err
+
+
+def test_what_reading_put_right_is_said_too(capsys):
+    posts = str(data_file("strangers/posts.mcap"))
+    assert run(["calibrate", posts]) == 0
+    assert "see the robot itself" in capsys.readouterr().out
+    assert run(["calibrate", posts, "--json"]) == 0
+    (said,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert "as by --mask -138:-132" in said
+
+
+def test_two_clocks_are_named(capsys):
+    assert run(["calibrate", str(data_file("strangers/two-clocks.mcap"))]) == 65
+    assert "stamped by two clocks; from their times of recording, --clock-offset" in capsys.readouterr().err
