@@ -32,8 +32,7 @@ def checked_held(
         f"odometry stands still while the scans move, from scan {names}: it is not used "
         "there, and steady motion takes its place; --as-recorded uses it as it is"
     )
-    log = without_held(log, held)
-    return with_turned_headings(log, [last + 1 for _, last in held], options), [message]
+    return without_held(log, held, options), [message]
 
 
 def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptions) -> list[tuple[int, int]]:
@@ -58,37 +57,35 @@ def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptio
     return [(first, end - 1) for first, end in mask_runs(is_held)]
 
 
-def without_held(log: LaserLog, stretches: list[tuple[int, int]]) -> LaserLog:
-    """The log without its odometry after the beginning of each stretch, up to its end."""
+def without_held(log: LaserLog, stretches: list[tuple[int, int]], options: HeldOdometryOptions) -> LaserLog:
+    """The log without its odometry after the beginning of each stretch, up to its end.
+
+    Behind it, the headings fit the positions again.
+    """
     assert log.odometry is not None
     odometry = log.odometry.copy()
     for first, last in stretches:
         odometry[first + 1 : last + 1] = np.nan
+    _turn_headings(odometry, [last + 1 for _, last in stretches], options)
     # What was recorded between the scans stands still as well.
     path = None if log.odometry_path is None else robot_path(log.times, odometry)
     return replace(log, odometry=odometry, odometry_path=path)
 
 
-def with_turned_headings(log: LaserLog, begins: list[int], options: HeldOdometryOptions) -> LaserLog:
-    """The log with headings that fit the positions again where odometry `begins` anew, at these rows.
+def _turn_headings(odometry: Array, begins: list[int], options: HeldOdometryOptions) -> None:
+    """Turn the headings of odometry (S, 3) so that they fit the positions where it `begins` anew, at these
+    rows.
 
     A heading that stood has lost the turns, but positions may have gone on. Robots drive the way that they
     head, or always some other way. Where they do not, nothing is changed.
     """
-    if log.odometry is None:
-        return log
-    odometry = log.odometry.copy()
-    for begin, end in itertools.pairwise([*begins, len(log)]):
+    for begin, end in itertools.pairwise([*begins, len(odometry)]):
         before, behind = (
             _usual_heading(odometry[rows], options) for rows in (slice(0, begin), slice(begin, end))
         )
         turn = float(wrap(behind - before))
         if abs(turn) > options.min_lost_turn:
             odometry[begin:, 2] += turn
-    if np.array_equal(odometry, log.odometry, equal_nan=True):
-        return log
-    path = None if log.odometry_path is None else robot_path(log.times, odometry)
-    return replace(log, odometry=odometry, odometry_path=path)
 
 
 def _usual_heading(odometry: Array, options: HeldOdometryOptions) -> float:

@@ -229,6 +229,9 @@ class HeldOdometryOptions:
     standing_share: float = 0.3
     """The robot stands if no more than this share of the first few steps have motion; where robots stand on
     real logs it is 0.15 at most. A larger value takes less time."""
+    min_moving_share: float = 0.7
+    """Least share of the measured steps with motion. A larger value finds less; a small one takes people who
+    pass a standing robot for motion."""
     min_lost_turn: float = 0.1
     """Headings are turned if they are off the way that the robot drives by more behind such a time, rad. A
     larger value turns less often."""
@@ -239,6 +242,3 @@ class HeldOdometryOptions:
     min_agreement: float = 0.9
     """Length of the mean of the directions of these steps, 1 if all are the same. A larger value turns less
     often."""
-    min_moving_share: float = 0.7
-    """Least share of the measured steps with motion. A larger value finds less; a small one takes people who
-    pass a standing robot for motion."""

@@ -92,11 +92,10 @@ class Tracker:
             if self._track.counts[MAY_WAIT] and not has_left:
                 k += 1
                 continue
-            has_few = found.inliers[k] < self.options.scan.lost_inliers
-            is_searched = not has_left and (has_few or not are_known(odometry[k]))
+            few = self.options.scan.lost_inliers
+            is_searched = not has_left and (found.inliers[k] < few or not are_known(odometry[k]))
             is_clear = is_searched and self._search(scans.of(k), found, k)
-            has_few = found.inliers[k] < self.options.scan.lost_inliers
-            is_lost = self._settings.is_alone and has_few and not is_clear
+            is_lost = self._settings.is_alone and found.inliers[k] < few and not is_clear
             if is_lost and self._left_out is not None and not self._is_tried:
                 points, pose = self._left_out
                 self._insert(np.concatenate([points, self._gap_points(points)]), pose)
@@ -231,7 +230,7 @@ class Tracker:
 
 
 def _cost(prior: Prior, pose: Array) -> float:
-    """What a prior adds to the objective at a pose (3,)."""
+    """What a prior adds to the objective at a pose (3,): `prior_value`, without compiling it for Python."""
     off = pose - prior.mean
     off[2] = wrap(off[2])
     return float(0.5 * off @ prior.information @ off)
