@@ -23,7 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_noise import noise_of_ranges
-from nscan_cli.logs.range_unit import scaled, wrong_unit
+from nscan_cli.logs.range_unit import WrongUnit, scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.repeated_reading import without_repeated_readings
@@ -35,6 +35,7 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
 from nscan_cli.logs.two_odometries import of_one_source
+from nscan_cli.logs.unit_by_odometry import UnitByOdometry, unit_by_odometry
 from nscan_cli.logs.unit_stretches import in_one_unit
 from nscan_cli.logs.unusable_readings import unusable_readings
 from nscan_cli.logs.whole_revolution import in_whole_revolutions
@@ -95,7 +96,7 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings, of_file = findings.warnings, len(findings.warnings)
-    raw, limits, contradictions = _in_metres(raw, times, findings)
+    raw, limits, contradictions = _in_metres(raw, times, motion.odometry, mount, findings)
     repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
         raw, converted = with_radians(raw)
@@ -246,9 +247,12 @@ def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingO
 
 
 def _in_metres(
-    raw: RawScans, times: ScanOrder, findings: ReaderFindings
+    raw: RawScans, times: ScanOrder, odometry: Array | None, mount: Array, findings: ReaderFindings
 ) -> tuple[RawScans, RangeLimits, list[str]]:
-    """The scans in metres, their limits, and messages if the scans contradict the unit of the log."""
+    """The scans in metres, their limits, and messages if the scans contradict the unit of the log.
+
+    odometry (S, 3) is in order of time, and the laser is at `mount` (3,) on the robot.
+    """
     options = findings.options
     if options.range_scale is not None:
         raw = scaled(raw, options.range_scale)
@@ -256,10 +260,23 @@ def _in_metres(
     raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times)
     said: list[str] = []
     limits = limits_in_force(raw, options, said)
-    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
-    if unit is None or not unit.is_certain:
+    unit = None if options.as_recorded else _unit(raw, times, odometry, mount, limits)
+    if unit is None:
         findings.warnings += said
         return raw, limits, mixed
     raw, findings.used["range_scale"] = scaled(raw, unit.scale), f"{unit.scale:g}"
     limits = limits_in_force(raw, options, findings.warnings)
     return raw, limits, [*mixed, unit.correction]
+
+
+def _unit(
+    raw: RawScans, times: ScanOrder, odometry: Array | None, mount: Array, limits: RangeLimits
+) -> WrongUnit | UnitByOdometry | None:
+    """The unit of the readings, if it is beyond doubt and not metres. Where odometry tells another one than
+    their size, that is the unit."""
+    by_odometry = unit_by_odometry(raw, times, odometry, mount, limits.no_return)
+    by_size = wrong_unit(raw.ranges, limits)
+    is_certain = by_size is not None and by_size.is_certain
+    if by_odometry is None or (by_size is not None and is_certain and by_size.scale == by_odometry.scale):
+        return by_size if is_certain else None
+    return by_odometry

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.raw_scans import RawScans
@@ -99,8 +100,7 @@ def wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> WrongUnit | 
     options = RangeUnitOptions()
     some = ranges.reshape(-1)[:: -(-ranges.size // options.sample)]
     some = some[(some > 0) & np.isfinite(some)]
-    if limits.no_return is not None and not _continue_beyond(some, limits.no_return):
-        some = some[some < limits.no_return]
+    some = some[some < end_of_distances(some, limits.no_return)]
     if not some.size:
         return None
     highest = float(limits.high.max())
@@ -138,16 +138,17 @@ def _are_of_walls(ranges: NDArray[np.float32], median: float, options: RangeUnit
     return not changes.size or float(np.median(changes)) <= options.max_neighbour_change * median
 
 
-def _continue_beyond(readings: NDArray[np.float32], no_return: float) -> bool:
-    """Whether most readings (N,) are far beyond the value that seems to mean "no return", and differ.
-
-    Among whole numbers, any looks like a peak.
+def end_of_distances(readings: NDArray[np.float32], no_return: float | None) -> float:
+    """The value from which on readings (N,) are of no distance: that which seems to mean "no return"; inf if
+    there is none, or most readings are far beyond it, and differ. Among whole numbers, any looks like a peak.
     """
+    if no_return is None:
+        return math.inf
     beyond = readings[readings > RangeLimitOptions.neighbourhood * no_return]
     if 2 * beyond.size <= readings.size:
-        return False
+        return no_return
     _, counts = np.unique(beyond, return_counts=True)
-    return bool(2 * counts.max() < beyond.size)
+    return math.inf if 2 * counts.max() < beyond.size else no_return
 
 
 def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = RangeUnitOptions()) -> RawScans:
@@ -164,6 +165,8 @@ def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = RangeUnitOpt
     )
     if scale > 1.0:
         shares_unit &= high < options.limits_apart
+    # That is assumed, in metres.
+    shares_unit &= high != CARMEN_MAX_RANGE
     low = np.where(low >= options.limits_apart, low * scale, low)
     limits = low, np.where(shares_unit, high * scale, high)
     return replace(raw, ranges=raw.ranges * np.float32(scale), limits=limits)

@@ -33,6 +33,7 @@ from nscan_cli.logs.sweep import SweepOptions
 from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
 from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.logs.two_odometries import TwoOdometriesOptions
+from nscan_cli.logs.unit_by_odometry import UnitByOdometryOptions
 from nscan_cli.logs.unit_stretches import UnitStretchOptions
 from nscan_cli.logs.wall_angles import BeamSpacingOptions
 from nscan_cli.logs.whole_revolution import WholeRevolutionOptions
@@ -54,6 +55,8 @@ class ScanCheckOptions:
     """A reading that stands for none."""
     range_unit: RangeUnitOptions = field(default_factory=RangeUnitOptions)
     """Whether all readings are in metres."""
+    unit_by_odometry: UnitByOdometryOptions = field(default_factory=UnitByOdometryOptions)
+    """Whether all readings are in metres, by odometry."""
     unit_stretches: UnitStretchOptions = field(default_factory=UnitStretchOptions)
     """Whether some scans are in another unit than the others."""
     rounded_ranges: RoundedRangeOptions = field(default_factory=RoundedRangeOptions)

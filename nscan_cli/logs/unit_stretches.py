@@ -42,6 +42,9 @@ class UnitStretchOptions:
     min_factor_share: float = 0.75
     """Least share of the readings of both scans that differ by one factor: 0.58 at most on real logs, for a
     factor of 1.5. A larger value tells less."""
+    least_unknown_factor: float = 10.0
+    """Stretches that are told by their usual readings alone, of which no unit is known, have this factor at
+    least: the usual readings of two rooms differ by less. A larger value tells less."""
     min_factor_readings: int = 12
     """Least number of beams with a reading in both scans. A larger value tells less."""
 
@@ -72,6 +75,8 @@ def in_one_unit(
     names = stretch_names((first, end - 1) for first, end in mask_runs(is_far))
     factor = float(np.median(far) / np.median(near))
     unit = _unit(some, is_told, is_far, factor, options)
+    if unit is None and factor < options.least_unknown_factor:
+        return raw, _sudden_factors(some, is_told, times, options)
     if unit is None:
         return raw, [
             f"the ranges of scans {names} are {factor:.3g} times the others: they are likely in another "
