@@ -11,6 +11,7 @@ from nscan_cli.files.provenance import as_parameters
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.relative_covariance import RelativePoses
 from nscan_cli.poses import Indices
+from nscan_cli.slam.consistency.contradicted_rows import contradicted_rows
 from nscan_cli.slam.consistency.options import VerificationOptions
 from nscan_cli.slam.consistency.path_differences import PathDifference, path_differences
 from nscan_cli.slam.consistency.repeated_maps import WITHOUT_ODOMETRY, MappedPath, repeats
@@ -88,6 +89,12 @@ def verify(state: SlamState, graph: Graph, options: VerificationOptions, threads
     path = MappedPath(rows, graph.poses, breaks, (), rows if log.odometry is None else state.degenerate_scans)
     runs = repeats(log)
     paths = map_in_threads(threads, lambda run: run(log, slam), runs.values())
+    paths = [
+        replace(again, contradicted=contradicted_rows(log, path, again, options))
+        if name == WITHOUT_ODOMETRY and not again.notices
+        else again
+        for name, again in zip(runs, paths, strict=True)
+    ]
     found = [path_differences(path, again, options) for again in paths]
     ends = [row for some in found for each in some for row in (each.first, each.last)]
     known = RelativePoses(graph, np.unique(graph.anchors[ends]).tolist())

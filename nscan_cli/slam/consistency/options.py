@@ -24,6 +24,19 @@ class VerificationOptions:
     start: float = 0.3
     """Without odometry a robot that begins in a bare corridor seems to stand at first. The comparison begins
     where the repeated map is this far from its start, m. A larger value compares less."""
+    compared_move: float = 0.3
+    """Scans so far apart on the path, m, tell whether a repeat without odometry is wrong. A smaller value
+    compares more of them."""
+    compared_turn: float = 0.3
+    """Or turned so far against each other, rad."""
+    compared: int = 3
+    """Each scan is compared with so many of these before and behind it. More take longer."""
+    different_step: float = 0.02
+    """Two scans are compared if their relative poses on both paths differ by more than this, m and rad
+    together. A smaller value compares more."""
+    min_gain: float = 0.2
+    """A scan contradicts a repeat if the mean energy of its points, from -1 to -3 where they fit, is higher
+    there than on the path by more than this. A larger value counts more repeats."""
     max_difference: float = 0.3
     """Largest difference of two maps without a warning, m. It is below 0.2 m on sound logs. A larger value
     warns less."""

@@ -38,7 +38,7 @@ def path_differences(
 
     The relative poses of the first and the last scan of a way are compared. A length is left out if no way is
     that long without a break, without a gap, and without scans of which the repeat alone does not tell the
-    place.
+    place or contradicts its own.
     """
     at = np.searchsorted(path.rows, repeat.rows)
     one, other = path.poses[at], repeat.poses
@@ -78,7 +78,8 @@ def _is_apart(poses: Array, path: MappedPath, repeat: MappedPath, options: Verif
     guessed = np.setdiff1d(
         np.union1d(repeat.degenerate, repeat.standing_rows(options.start)), path.degenerate
     )
-    broken = np.searchsorted(repeat.rows, np.union1d(np.union1d(path.breaks, repeat.breaks), guessed)) - 1
+    apart = np.unique(np.concatenate([path.breaks, repeat.breaks, repeat.contradicted, guessed]))
+    broken = np.searchsorted(repeat.rows, apart) - 1
     far[np.clip(broken, 0, len(far) - 1)] = True
     return far
 

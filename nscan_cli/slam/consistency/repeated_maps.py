@@ -33,6 +33,8 @@ class MappedPath:
     """The notices of the run."""
     degenerate: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Rows of scans along bare walls, without odometry, that do not tell their places."""
+    contradicted: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Rows of scans that fit those around them worse than on another path; see contradicted_rows.py."""
     has_odometry: bool = True
     """Whether its log had any."""
 
@@ -59,8 +61,9 @@ def path_of(log: LaserLog, options: SlamOptions, rows: Indices | None = None) ->
     state = SlamState.of_log(log if len(rows) == len(log) else excerpt(log, rows), options)
     graph = run_slam(state, lambda *_counts: None)
     breaks = rows[np.array(state.breaks, dtype=np.int64)]
-    degenerate, has_odometry = rows[state.degenerate_scans], log.odometry is not None
-    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), degenerate, has_odometry)
+    degenerate = rows[state.degenerate_scans]
+    said, has_odometry = tuple(notices(state)), log.odometry is not None
+    return MappedPath(rows, graph.poses, breaks, said, degenerate, has_odometry=has_odometry)
 
 
 def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:
