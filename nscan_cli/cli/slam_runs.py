@@ -175,6 +175,7 @@ def _graph_log(
     """The log of a saved graph, the rows of its scans, and its files' paths; None without a log."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
     from nscan_cli.logs.log_files import files_of
+    from nscan_cli.slam.backend.guessed_steps import guesses_of
     from nscan_cli.slam.backend.resume import can_refine, options_of
 
     if not can_refine(graph):
@@ -184,11 +185,14 @@ def _graph_log(
             )
         say(f"{path}: was not made from a log by slam: it is optimised but not refined", quiet)
         return None
+    place = "provenance.parameters"
     try:
         options_of(graph)
+        place = "provenance"
+        guesses_of(graph)
     except ValueError as error:
         raise InputDataError(
-            label(path), f"provenance.parameters: {error}", "correct it, or create the graph again"
+            label(path), f"{place}: {error}", "correct it, or create the graph again"
         ) from error
     try:
         log_files = find_log(path, graph) if log_files is None else log_files

@@ -14,6 +14,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_checks import SCAN_CHECKS
+from nscan_cli.slam.backend.guessed_steps import guessed_steps
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import Relations, SlamOptions
@@ -91,5 +92,5 @@ def map_log(
     }
     state, graph, said = drive.state, drive.graph, log.report.notices() + checked.messages + drive.messages
     said += notices(state, checked.companions_checked)
-    graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
+    graph.provenance = {**provenance_of([log.source], parameters), "notices": said, **guessed_steps(state)}
     return state, graph

@@ -67,6 +67,10 @@ class SlamState:
     nscan_relations: list[NScan] = field(default_factory=list)
     other_relations: list[Relation] = field(default_factory=list)
     """Relations of a saved graph that the loop does not make."""
+    saved_relations: list[Relation] = field(default_factory=list)
+    """Those of a saved graph: they are as uncertain as guesses make them."""
+    saved_guesses: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(K − 1, 3) variances of what was guessed on the way of a saved graph; see `guess_variances`."""
     loops: list[Loop] = field(default_factory=list)
     """The verdicts on loops, accepted and refused ones."""
     places: list[Place] = field(default_factory=list)

@@ -80,8 +80,26 @@ them."""
 def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     """The pairwise and the nScan relations, as certain as scans tell the way."""
     pairwise, nscan = state.pairwise_relations, state.nscan_relations
-    if not state.weakest_sigmas:
+    variances = guess_variances(state)
+    if not variances.any():
         return pairwise, nscan
+    most = state.options.degenerate_relations.most_steps
+    already = {id(relation) for relation in state.saved_relations}
+    widened = with_guess_variances(pairwise, nscan, state.route.rows, variances, most)
+    if not already:
+        return widened
+    pairs = [old if id(old) in already else new for old, new in zip(pairwise, widened[0], strict=True)]
+    return pairs, [old if id(old) in already else new for old, new in zip(nscan, widened[1], strict=True)]
+
+
+def guess_variances(state: SlamState) -> Array:
+    """The variances (K − 1, 3) of what is guessed from each keyframe to the next: along the way (m²), and,
+    where scans fit nothing, of place (m²) and of turn (rad²).
+
+    Those of tracking; of a saved graph those that it has.
+    """
+    if not state.weakest_sigmas:
+        return state.saved_guesses if len(state.saved_guesses) else np.zeros((len(state.route.rows) - 1, 3))
     # Scans after the last keyframe may be tracked by another thread at this moment.
     end = int(state.route.rows[-1]) + 1
     path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.weakest_sigmas))[:end]
@@ -90,12 +108,9 @@ def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     # A robot that seems to stand mostly does.
     ways = [way for way in found if way.is_long(options.stretch)]
     lost = [keyframe.guess_variances for keyframe in state.route.keyframes[1 : len(rows)]]
-    variances = np.column_stack(
+    return np.column_stack(
         [length_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]
     )
-    if not variances.any():
-        return pairwise, nscan
-    return with_guess_variances(pairwise, nscan, rows, variances, options.most_steps)
 
 
 def all_widened_relations(state: SlamState) -> list[Relation]:

@@ -19,6 +19,7 @@ from nscan_cli.matching.motion_model import odometry_prior
 from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.final_deskewing import add_keyframes_at, tracked_at
 from nscan_cli.slam.backend.finish import finish_graph
+from nscan_cli.slam.backend.guessed_steps import guesses_of
 from nscan_cli.slam.backend.loop_rejection import reject_contradicting_loops
 from nscan_cli.slam.backend.odometry_over_breaks import believe_odometry_over_breaks
 from nscan_cli.slam.backend.refinement import refine
@@ -95,6 +96,8 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
         odometry_relations=[pair for pair in matched if pair.origin == "odometry"],
         nscan_relations=list(graph.nscan),
         other_relations=list(graph.others),
+        saved_relations=[*graph.pairwise, *graph.nscan],
+        saved_guesses=guesses_of(graph),
         loops=[loop for loop in graph.loops if loop.reason not in SEARCH_VERDICTS],
         places=_large_loop_places(graph, options),
     )
