@@ -41,7 +41,8 @@ from nscan_cli.slam.options import SlamOptions
 class SegmentTracker:
     """Tracks the robot segment by segment. Poses of all segments are in one frame, as odometry guesses it.
 
-    `odometry` says whether the scans have any, `laser` is what their laser has in view.
+    `odometry` says whether the scans have any, `laser` is what their laser has in view. Where odometry begins
+    later than the log, the robot drives with a `speed` (m/s) before.
     """
 
     def __init__(
@@ -50,10 +51,11 @@ class SegmentTracker:
         breaking: BreakOptions,
         odometry: bool = True,
         laser: LaserView | None = None,
+        speed: float = 0.0,
     ) -> None:
         self.options, self.breaking = options, breaking
         self._has_odometry, self._laser = odometry, laser
-        self.tracker = self._new_tracker()
+        self.tracker = self._new_tracker(speed)
         self._restarts = self._searches = 0
         """Restarts and searches of the trackers of earlier segments."""
         self._origin: Array | None = None
@@ -117,9 +119,9 @@ class SegmentTracker:
         self.tracker = self._new_tracker()
         return settled
 
-    def _new_tracker(self) -> Tracker | TwoSidedTracker:
+    def _new_tracker(self, speed: float = 0.0) -> Tracker | TwoSidedTracker:
         if self._has_odometry:
-            return Tracker(self.options, laser=self._laser)
+            return Tracker(self.options, laser=self._laser, speed=speed)
         return TwoSidedTracker(self.options, self._laser)
 
     def _track(self, scans: ScanBatch, may_wait: bool) -> TrackedBatch:
@@ -255,9 +257,18 @@ class SegmentTracker:
 
 def tracker_of(log: LaserLog, options: SlamOptions) -> SegmentTracker:
     """The tracker for a log."""
-    return SegmentTracker(
-        options.tracking, options.breaks, log.odometry is not None, laser_view(log, options.tracking)
-    )
+    laser, speed = laser_view(log, options.tracking), first_speed(log, options.tracking.velocity_scans)
+    return SegmentTracker(options.tracking, options.breaks, log.odometry is not None, laser, speed)
+
+
+def first_speed(log: LaserLog, scans: int) -> float:
+    """The speed ahead (m/s) with which odometry begins, by its first steps between scans; 0 if the first scan
+    has odometry, or the robot stands."""
+    if log.odometry is None or are_known(log.odometry[0]):
+        return 0.0
+    rows = np.flatnonzero(are_known(log.odometry))[: scans + 1]
+    lasts = float(log.times[rows[-1]] - log.times[rows[0]]) if len(rows) else 0.0
+    return float(relative(log.odometry[rows[-1]], log.odometry[rows[0]])[0]) / lasts if lasts > 0.0 else 0.0
 
 
 def pose_of_first_scan(scans: ScanBatch, found: TrackedScans, options: TrackingOptions) -> Array:

@@ -39,12 +39,18 @@ class Tracker:
 
     Without odometry, the faces of a wall are not Gaussians of their own: exact ones hold the robot in place
     in corridors that come into view. And all stages converge, since the start of a match is a guess.
+
+    Where the first scans have no odometry, the robot drives ahead with a `speed` (m/s) before them.
     """
 
     def __init__(
-        self, options: TrackingOptions, odometry: bool = True, laser: LaserView | None = None
+        self,
+        options: TrackingOptions,
+        odometry: bool = True,
+        laser: LaserView | None = None,
+        speed: float = 0.0,
     ) -> None:
-        self.options = options
+        self.options, self._speed = options, speed
         self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, laser)
@@ -67,6 +73,12 @@ class Tracker:
 
     def track(self, scans: ScanBatch, may_wait: bool = False) -> TrackedScans:
         """Track the next scans. Of the last ones, which may wait for scans after them, nothing is found."""
+        if self._speed and len(scans) > 1:
+            speed, self._speed = self._speed, 0.0
+            first = self.track(scans.part(0, 1))
+            if scans.odometry is not None and not are_known(scans.odometry[0]):
+                self._drives(speed, float(scans.times[1] - scans.times[0]))
+            return TrackedScans.together([first, self.track(scans.part(1, len(scans)), may_wait)])
         if self._settings.is_alone and self._track.counts[KNOWN] == 0 and len(scans):
             self._insert(self._gap_points(scans.of(0)), np.zeros(3))
         n, k, ends = len(scans), 0, scans.ends
@@ -113,6 +125,13 @@ class Tracker:
                 self._keep(found, k)
             k += 1
         return found.part(0, int(self._track.counts[NEXT]))
+
+    def _drives(self, speed: float, period: float) -> None:
+        """The robot has come with a speed (m/s) to the first scan, which is a period (s) before the next."""
+        poses, times = self._track.poses, self._track.times
+        back = period * np.arange(len(poses))[::-1]
+        poses[:, 0], times[:] = -speed * back, times[-1] - back
+        self._track.counts[KNOWN] = len(poses)
 
     def _leave_out(self, points: Array, found: TrackedScans, k: int) -> None:
         """Scan k of points (m, 2) is lost."""
