@@ -110,6 +110,8 @@ def reading_options(command: Command) -> Command:
         read("--no-odometry", is_flag=True, help="Ignore odometry."),
         rare("--range-scale", type=click.FloatRange(0, min_open=True), metavar="F",
              help="Multiply the ranges: 0.001 for millimetres. Default: 1, or what the ranges show."),
+        rare("--range-offset", type=float, metavar="M",
+             help="Add to the ranges. Default: 0, or what straight walls show."),
         rare("--angle-min", type=float, metavar="DEG",
              help="Direction of the first beam. Default: that in the log."),
         rare("--angle-increment", type=float, metavar="DEG",

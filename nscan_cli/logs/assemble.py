@@ -23,6 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_noise import noise_of_ranges
+from nscan_cli.logs.range_offset import checked_offset
 from nscan_cli.logs.range_unit import WrongUnit, scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -139,6 +140,12 @@ def laser_log(
     if floor is not None:
         lost.counts["of the floor"] = without_floor(ranges, angle_min[rows], angle_increment[rows], floor)
         masked.append(floor.said)
+    offset, of_offset = checked_offset(ranges, angle_increment[rows], options)
+    contradictions += of_offset
+    if offset:
+        ranges += np.float32(offset)
+        ranges[ranges <= 0.0] = np.nan
+        findings.used["range_offset"] = f"{offset:g}"
     sweep = _sweep(raw, angle_increment, times, options)
     if sweep.origin:
         findings.used["turn"] = sweep.origin

@@ -34,6 +34,8 @@ class ReadingOptions:
     """Upper range limit, m. Readings from there on are read as no return."""
     range_scale: float | None = None
     """Metres in a unit of the log's ranges. Range limits in the same unit are scaled too."""
+    range_offset: float | None = None
+    """Length to add to all ranges, m."""
     angle_min: float | None = None
     """Direction of the first beam, rad."""
     angle_increment: float | None = None
@@ -70,8 +72,9 @@ class ReadingOptions:
 
     def __post_init__(self) -> None:
         """Raises WrongUsageError for values that fit no log."""
-        given = (self.min_range, self.max_range, self.range_scale, self.angle_min, self.angle_increment,
-                 self.start, self.end, self.odometry_scale, self.clock_offset, self.sweep)  # fmt: skip
+        given = (self.min_range, self.max_range, self.range_scale, self.range_offset, self.angle_min,
+                 self.angle_increment, self.start, self.end, self.odometry_scale, self.clock_offset,
+                 self.sweep)  # fmt: skip
         if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
             raise WrongUsageError("a reading option is not a finite number; give one that is")
         if self.max_range is not None and self.max_range <= (self.min_range or 0.0):

@@ -15,6 +15,7 @@ from nscan_cli.logs.jittery_odometry import JitteryOdometryOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
 from nscan_cli.logs.range_noise import RangeNoiseOptions
+from nscan_cli.logs.range_offset import RangeOffsetOptions
 from nscan_cli.logs.range_peaks import RangeLimitOptions
 from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
@@ -73,6 +74,8 @@ class ScanCheckOptions:
     """Whether directions change in the file alone."""
     beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
     """Whether walls fit the angle between beams."""
+    range_offset: RangeOffsetOptions = field(default_factory=RangeOffsetOptions)
+    """Whether a length is added to all ranges."""
     whole_turn: WholeRevolutionOptions = field(default_factory=WholeRevolutionOptions)
     """Whether beams cover a whole revolution. Saved graphs have this name, and `turn_segments`."""
     text_logs: TextLogOptions = field(default_factory=TextLogOptions)

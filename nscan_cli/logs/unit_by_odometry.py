@@ -20,7 +20,7 @@ from nscan_cli.logs.robot_parts import evenly
 from nscan_cli.logs.scan_order import ScanOrder
 from nscan_cli.poses import Array, Indices, are_known, compose, relative, wrap
 
-UNITS = (
+SMALLER_UNITS = (
     ("millimetres", 0.001),
     ("centimetres", 0.01),
     ("inches", 0.0254),
@@ -142,7 +142,7 @@ def unit_by_odometry(
     if _explained(scans, steps, median, options) is not None:
         return None
     told = []
-    for name, scale in UNITS:
+    for name, scale in SMALLER_UNITS:
         # Or odometry is in another unit, and the ranges are in metres.
         as_ranges = abs(math.log(median * scale / options.typical_median)) + _off(speed, options)
         as_odometry = abs(math.log(median / options.typical_median)) + _off(speed / scale, options)

@@ -60,7 +60,8 @@ def test_reading_options_are_in_metres_and_radians(calls):
         calls, "--laser", "RLASER", "--mount", "0.1,-0.2,90", "--flip", "--min-range", "0.2",
         "--max-range", "30", "--angle-min", "-90", "--angle-increment", "0.5", "--start", "1",
         "--end", "20", "--every", "3", "--no-odometry", "--strict", "--allow-corrected",
-        "--topic", "/scan", "--odom-topic", "/odom", "--salvage", "--range-scale", "0.001", "--as-recorded",
+        "--topic", "/scan", "--odom-topic", "/odom", "--salvage", "--range-scale", "0.001",
+        "--range-offset", "-0.05", "--as-recorded",
         "--odometry-scale", "0.001", "--clock-offset", "-30",
         "--mask", "130:150,-150:-130",
     )["reading"]  # fmt: skip
@@ -68,7 +69,7 @@ def test_reading_options_are_in_metres_and_radians(calls):
         laser="RLASER", mount=(0.1, -0.2, math.pi / 2), flip=True, min_range=0.2, max_range=30.0,
         angle_min=-math.pi / 2, angle_increment=math.radians(0.5), start=1.0, end=20.0, every=3,
         odometry=False, strict=True, allow_corrected=True, topic="/scan", odom_topic="/odom", salvage=True,
-        range_scale=0.001, as_recorded=True, odometry_scale=0.001, clock_offset=-30.0,
+        range_scale=0.001, range_offset=-0.05, as_recorded=True, odometry_scale=0.001, clock_offset=-30.0,
         mask=((math.radians(130), math.radians(150)), (math.radians(-150), math.radians(-130))),
     )  # fmt: skip
 

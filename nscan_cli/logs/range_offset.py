@@ -1,0 +1,187 @@
+"""Ranges that all are too long or too short by one length: walls are bent then.
+
+On a wall 1/r is a sine of the bearing. With a length added to all ranges it is none: a wall bends, the nearer
+the more. So every wall that is seen over a wide angle tells that length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_parts import evenly
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class RangeOffsetOptions:
+    """When a length is taken from all ranges, or added."""
+
+    half_widths: tuple[float, ...] = (0.4, 0.6)
+    """Walls are looked for within these angles on both sides of a beam, rad. Wider ones tell the length more
+    precisely, and there are fewer."""
+    beams: int = 25
+    """Largest number of beams on a wall that are fitted, evenly spread. More take longer."""
+    starts: int = 3
+    """So many walls are tried within each half width. More take longer."""
+    scans: tuple[int, int] = (400, 2500)
+    """Numbers of scans that are looked at, evenly spread: the second where the first show few walls."""
+    parts: int = 4
+    """In each of so many parts of the log that shows walls enough most have to tell half of it: a round
+    thing in a small room looks like a bent wall. More parts change fewer logs."""
+    min_walls: int = 100
+    """Least number of walls that decide. A larger value decides for fewer logs."""
+    max_range: float = 8.0
+    """Farthest beam on a wall, m: the farther, the less it is bent. A larger value fits more walls."""
+    max_ratio: float = 2.5
+    """Largest ratio of the ranges on a wall. A larger value fits more walls."""
+    max_offset: float = 0.5
+    """Largest length that is looked for, m."""
+    same_offset: float = 0.5
+    """Beams are fitted as a wall if the outer and the inner ones tell the same length to within this, m."""
+    max_residual: float = 0.025
+    """Largest standard deviation of the beams on a wall, m. A larger value takes more for walls."""
+    least_noise: float = 0.005
+    """Least standard deviation that beams are taken to have, m."""
+    max_sigma: float = 0.06
+    """Largest standard deviation of the length that a wall tells, m. A larger value counts more walls."""
+    min_offset: float = 0.06
+    """Three quarters of the walls, by weight, tell at least this length, m: it is -0.03 to 0.05 on real logs,
+    the most by lasers that measure too long. A larger value changes fewer logs."""
+    bandwidth: float = 0.025
+    """Width of the kernel with which the length that most walls tell is found, m."""
+
+
+class WallOffsets(NamedTuple):
+    """What walls tell."""
+
+    offsets: Array
+    """(n,) lengths by which ranges are too long, m, in order."""
+    weights: Array
+    """(n,)"""
+
+    def quantile(self, share: float) -> float:
+        """The length which walls of this share of the weight are below."""
+        shares = np.cumsum(self.weights)
+        return float(self.offsets[np.searchsorted(shares, share * shares[-1])])
+
+    def tell(self, options: RangeOffsetOptions) -> float:
+        """The sign of the length that ranges are off by beyond doubt; 0 for none."""
+        low, high = self.quantile(0.25), self.quantile(0.75)
+        return 1.0 if low >= options.min_offset else -1.0 if high <= -options.min_offset else 0.0
+
+    def most_told(self, options: RangeOffsetOptions) -> float:
+        """The length that most of the weight is about."""
+        tried = np.arange(-options.max_offset, options.max_offset, options.bandwidth / 5.0)
+        off = (self.offsets - tried[:, np.newaxis]) / options.bandwidth
+        return float(tried[np.argmax(np.exp(-0.5 * off**2) @ self.weights)])
+
+
+def checked_offset(
+    ranges: NDArray[np.float32], steps: Array, reading: ReadingOptions
+) -> tuple[float, list[str]]:
+    """The length to add to ranges (S, B), m, and what is said of it; 0 if they are right.
+
+    `steps` (S,) are the angles from beam to beam, rad. Only finite ranges are distances.
+    """
+    if reading.range_offset is not None or reading.as_recorded or not len(ranges):
+        return reading.range_offset or 0.0, []
+    options = RangeOffsetOptions()
+    found = _wall_offsets(ranges, steps, options.scans[0], options)
+    if len(found.offsets) < options.min_walls < len(ranges):
+        found = _wall_offsets(ranges, steps, options.scans[1], options)
+    if len(found.offsets) < options.min_walls:
+        return 0.0, []
+    sign = found.tell(options)
+    if not sign or any(
+        sign * part.quantile(0.5) < 0.5 * options.min_offset for part in _of_parts(ranges, steps, options)
+    ):
+        return 0.0, []
+    offset = round(found.most_told(options), 2)
+    what = "long" if offset > 0.0 else "short"
+    return -offset, [
+        f"the ranges are {abs(offset):.2f} m too {what}: without that {len(found.offsets):,} walls are "
+        f"straight, with it they are bent; {-offset:+.2f} m is added, as by --range-offset {-offset:.2f}; "
+        "--as-recorded uses the ranges as they are"
+    ]
+
+
+def _of_parts(ranges: NDArray[np.float32], steps: Array, options: RangeOffsetOptions) -> list[WallOffsets]:
+    """What each part of the log tells that shows walls enough."""
+    parts = np.array_split(np.arange(len(ranges)), options.parts)
+    scans = options.scans[1] // options.parts
+    told = [_wall_offsets(ranges[rows], steps[rows], scans, options) for rows in parts if len(rows)]
+    return [part for part in told if len(part.offsets) * options.parts >= options.min_walls]
+
+
+def _wall_offsets(
+    ranges: NDArray[np.float32], steps: Array, scans: int, options: RangeOffsetOptions
+) -> WallOffsets:
+    """What walls in so many scans tell."""
+    some, step = ranges[evenly(len(ranges), scans)], abs(float(np.median(steps)))
+    told = [np.zeros((0, 2))]
+    for half_width in options.half_widths:
+        half = round(half_width / step) if step > 0.0 else 0
+        if half >= 3 and 2 * half < some.shape[1]:
+            told.append(_told(some, step, half, options))
+    offsets, sigmas = np.concatenate(told).T
+    order = np.argsort(offsets, kind="stable")
+    return WallOffsets(offsets[order], sigmas[order] ** -2.0)
+
+
+def _told(ranges: NDArray[np.float32], step: float, half: int, options: RangeOffsetOptions) -> Array:
+    """(n, 2) lengths that walls within so many beams on both sides of one tell, and their deviations, m."""
+    beside = np.unique(np.rint(np.linspace(-half, half, min(2 * half + 1, options.beams))).astype(np.int64))
+    middles = np.arange(half, ranges.shape[1] - half, max(half // options.starts, 1))
+    seen = ranges[:, middles[:, np.newaxis] + beside].reshape(-1, len(beside)).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        farthest = seen.max(axis=1)
+        is_near = (farthest < options.max_range) & (farthest < options.max_ratio * seen.min(axis=1))
+    seen = seen[is_near]
+    angles: Array = step * beside.astype(np.float64)
+    middle = len(beside) // 2
+    outer, inner = (
+        _of_three(seen[:, [middle - off, middle, middle + off]], angles[middle + off])
+        for off in (middle, middle // 2)
+    )
+    with np.errstate(invalid="ignore"):
+        seen = seen[(np.abs(outer - inner) < options.same_offset) & (np.abs(outer) < options.max_offset)]
+    return _fitted(seen, angles, options)
+
+
+def _of_three(ranges: Array, angle: float) -> Array:
+    """(n,) the length that three beams (n, 3) on a wall tell, so many rad apart, to first order."""
+    one, two, three = ranges.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bend = 1.0 / one + 1.0 / three - 2.0 * np.cos(angle) / two
+        told: Array = -bend / (one**-2.0 + three**-2.0 - 2.0 * np.cos(angle) * two**-2.0)
+    return told
+
+
+def _fitted(seen: Array, angles: Array, options: RangeOffsetOptions) -> Array:
+    """(m, 2) offsets and deviations of those ranges (n, B), at angles (B,), that lie on a wall.
+
+    Gauss-Newton steps for r = 1/(a cos φ + b sin φ) + offset.
+    """
+    wave = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    if not len(seen):
+        return np.zeros((0, 2))
+    line, offset = (1.0 / seen) @ np.linalg.pinv(wave).T, np.zeros(len(seen))
+    for _ in range(6):
+        inverse = np.maximum(line @ wave.T, 0.5 / options.max_range)
+        slopes = np.concatenate([-wave / inverse[..., np.newaxis] ** 2, np.ones((*seen.shape, 1))], axis=2)
+        residuals = seen - offset[:, np.newaxis] - 1.0 / inverse
+        normal = np.swapaxes(slopes, 1, 2) @ slopes + 1e-9 * np.eye(3)
+        change = np.linalg.solve(normal, np.swapaxes(slopes, 1, 2) @ residuals[..., np.newaxis])[..., 0]
+        line = line + change[:, :2]
+        offset = np.clip(offset + change[:, 2], -2.0 * options.max_offset, 2.0 * options.max_offset)
+    residuals = seen - offset[:, np.newaxis] - 1.0 / np.maximum(line @ wave.T, 0.5 / options.max_range)
+    noise = np.sqrt((residuals**2).sum(axis=1) / (len(angles) - 3))
+    sigmas = np.maximum(noise, options.least_noise) * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
+    is_wall = (noise < options.max_residual) & (sigmas < options.max_sigma)
+    told: Array = np.column_stack([offset, sigmas])[is_wall]
+    return told

@@ -1,0 +1,84 @@
+"""Ranges that all are too long or too short by one length, told by walls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.range_offset import checked_offset
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.benchmarks.stranger_cases import with_own_angles
+from tests.data import SAMPLE_LOGS, data_file
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import office
+
+SOUND = ["intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic"]
+
+
+@pytest.fixture(scope="module")
+def sample() -> LaserLog:
+    return read_log(str(SAMPLE_LOGS / "office.log.gz"))
+
+
+def offset(log: LaserLog, added: float, reading: ReadingOptions = ReadingOptions()) -> float:
+    return checked_offset(log.ranges + np.float32(added), log.angle_increment, reading)[0]
+
+
+@pytest.mark.parametrize("added", [-0.15, -0.1, 0.1, 0.15])
+def test_what_all_ranges_have_too_much_is_taken_off(sample: LaserLog, added: float):
+    assert offset(sample, added) == pytest.approx(-added, abs=0.03)
+
+
+@pytest.mark.parametrize("added", [0.1, -0.12])
+def test_a_laser_of_270_degrees(added: float):
+    wide = Laser(541, np.radians(-135.0), np.radians(0.5), 20.0, no_return=81.0, mount=(0.1, 0.05, 0.0))
+    log = office().record_at(office().truth()[:600], 3, wide).log()
+    assert offset(log, 0.0) == 0.0
+    assert offset(log, added) == pytest.approx(-added, abs=0.03)
+
+
+def test_the_log_is_read_without_it_and_says_so(sample: LaserLog, tmp_path: Path):
+    path = tmp_path / "long.log"
+    path.write_bytes(with_own_angles(replace(sample, ranges=sample.ranges + np.float32(0.12))))
+    log = read_log(str(path))
+    (said,) = [each for each in log.report.contradictions if "m too long" in each]
+    assert "as by --range-offset -0.1" in said
+    seen = np.isfinite(log.ranges) & np.isfinite(sample.ranges)
+    assert abs(float(np.median(log.ranges[seen] - sample.ranges[seen]))) < 0.03
+    # Readings of no return stay what they are.
+    np.testing.assert_array_equal(np.isinf(log.ranges), np.isinf(sample.ranges))
+    # The option gives what is added, and no more is looked for.
+    given = read_log(str(path), ReadingOptions(range_offset=-0.12))
+    np.testing.assert_allclose(given.ranges[seen], sample.ranges[seen], atol=0.006)
+    assert not any("m too long" in each for each in given.report.contradictions)
+    recorded = read_log(str(path), ReadingOptions(as_recorded=True))
+    assert float(np.median(recorded.ranges[seen] - sample.ranges[seen])) == pytest.approx(0.12, abs=0.006)
+
+
+def test_random_ranges_tell_nothing(sample: LaserLog):
+    ranges = np.random.default_rng(1).uniform(0.5, 6.0, (400, 181)).astype(np.float32)
+    assert checked_offset(ranges, np.full(400, np.radians(1.0)), ReadingOptions()) == (0.0, [])
+    assert checked_offset(ranges[:0], np.zeros(0), ReadingOptions()) == (0.0, [])
+
+
+def test_round_screens_about_a_table_tell_nothing():
+    """Three quarters of the walls told 0.3 m, all from the second half of the log."""
+    log = read_log(str(data_file("walker.mcap")))
+    assert "range_offset" not in log.report.used
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_sound_logs_stay_as_they_are(name: str):
+    log = read_log(str(data_file(f"{name}.log.gz")))
+    assert "range_offset" not in log.report.used
+
+
+@pytest.mark.parametrize("name", ["mit-csail", "intel", "fr079"])
+def test_real_logs_whose_ranges_are_15_cm_too_long(name: str):
+    log = read_log(str(data_file(f"{name}.log.gz")))
+    assert offset(log, 0.15) == pytest.approx(-0.15, abs=0.04)
