@@ -30,6 +30,9 @@ class RangeOffsetOptions:
     """So many walls are tried within each half width. More take longer."""
     scans: tuple[int, int] = (400, 2500)
     """Numbers of scans that are looked at, evenly spread: the second where the first show few walls."""
+    max_nearness: float = 0.8
+    """The near half of the walls are at most so far away, as a share of the far half. A larger value decides
+    for more logs."""
     parts: int = 4
     """In each of so many parts of the log that shows walls enough most have to tell half of it: a round
     thing in a small room looks like a bent wall. More parts change fewer logs."""
@@ -63,6 +66,14 @@ class WallOffsets(NamedTuple):
     """(n,) lengths by which ranges are too long, m, in order."""
     weights: Array
     """(n,)"""
+    distances: Array
+    """(n,) of the walls from the laser, m."""
+
+    @classmethod
+    def of(cls, told: Array) -> WallOffsets:
+        """From (n, 3) offsets, their standard deviations, and distances."""
+        offsets, sigmas, distances = told[np.argsort(told[:, 0], kind="stable")].T
+        return cls(offsets, sigmas**-2.0, distances)
 
     def quantile(self, share: float) -> float:
         """The length which walls of this share of the weight are below."""
@@ -73,6 +84,20 @@ class WallOffsets(NamedTuple):
         """The sign of the length that ranges are off by beyond doubt; 0 for none."""
         low, high = self.quantile(0.25), self.quantile(0.75)
         return 1.0 if low >= options.min_offset else -1.0 if high <= -options.min_offset else 0.0
+
+    def is_of_ranges(self, options: RangeOffsetOptions) -> bool:
+        """Whether near walls tell as much as far ones do. A wrong angle between beams bends walls, too, as if
+        ranges were too long by a share of themselves."""
+        is_near = self.distances < np.median(self.distances)
+        near, far = (
+            WallOffsets(self.offsets[some], self.weights[some], self.distances[some])
+            for some in (is_near, ~is_near)
+        )
+        if not len(near.offsets):
+            return False
+        nearness = float(np.median(near.distances) / np.median(far.distances))
+        share = near.quantile(0.5) / far.quantile(0.5)
+        return nearness < options.max_nearness and share > 0.5 * (1.0 + nearness)
 
     def most_told(self, options: RangeOffsetOptions) -> float:
         """The length that most of the weight is about."""
@@ -97,8 +122,12 @@ def checked_offset(
     if len(found.offsets) < options.min_walls:
         return 0.0, []
     sign = found.tell(options)
-    if not sign or any(
-        sign * part.quantile(0.5) < 0.5 * options.min_offset for part in _of_parts(ranges, steps, options)
+    if (
+        not sign
+        or not found.is_of_ranges(options)
+        or any(
+            sign * part.quantile(0.5) < 0.5 * options.min_offset for part in _of_parts(ranges, steps, options)
+        )
     ):
         return 0.0, []
     offset = round(found.most_told(options), 2)
@@ -123,18 +152,16 @@ def _wall_offsets(
 ) -> WallOffsets:
     """What walls in so many scans tell."""
     some, step = ranges[evenly(len(ranges), scans)], abs(float(np.median(steps)))
-    told = [np.zeros((0, 2))]
+    told = [np.zeros((0, 3))]
     for half_width in options.half_widths:
         half = round(half_width / step) if step > 0.0 else 0
         if half >= 3 and 2 * half < some.shape[1]:
             told.append(_told(some, step, half, options))
-    offsets, sigmas = np.concatenate(told).T
-    order = np.argsort(offsets, kind="stable")
-    return WallOffsets(offsets[order], sigmas[order] ** -2.0)
+    return WallOffsets.of(np.concatenate(told))
 
 
 def _told(ranges: NDArray[np.float32], step: float, half: int, options: RangeOffsetOptions) -> Array:
-    """(n, 2) lengths that walls within so many beams on both sides of one tell, and their deviations, m."""
+    """(n, 3) offsets, deviations and distances, m, of walls within so many beams on both sides of one."""
     beside = np.unique(np.rint(np.linspace(-half, half, min(2 * half + 1, options.beams))).astype(np.int64))
     middles = np.arange(half, ranges.shape[1] - half, max(half // options.starts, 1))
     seen = ranges[:, middles[:, np.newaxis] + beside].reshape(-1, len(beside)).astype(np.float64)
@@ -163,13 +190,13 @@ def _of_three(ranges: Array, angle: float) -> Array:
 
 
 def _fitted(seen: Array, angles: Array, options: RangeOffsetOptions) -> Array:
-    """(m, 2) offsets and deviations of those ranges (n, B), at angles (B,), that lie on a wall.
+    """(m, 3) offsets, deviations and distances of those ranges (n, B), at angles (B,), that lie on a wall.
 
     Gauss-Newton steps for r = 1/(a cos φ + b sin φ) + offset.
     """
     wave = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     if not len(seen):
-        return np.zeros((0, 2))
+        return np.zeros((0, 3))
     line, offset = (1.0 / seen) @ np.linalg.pinv(wave).T, np.zeros(len(seen))
     for _ in range(6):
         inverse = np.maximum(line @ wave.T, 0.5 / options.max_range)
@@ -183,5 +210,5 @@ def _fitted(seen: Array, angles: Array, options: RangeOffsetOptions) -> Array:
     noise = np.sqrt((residuals**2).sum(axis=1) / (len(angles) - 3))
     sigmas = np.maximum(noise, options.least_noise) * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
     is_wall = (noise < options.max_residual) & (sigmas < options.max_sigma)
-    told: Array = np.column_stack([offset, sigmas])[is_wall]
+    told: Array = np.column_stack([offset, sigmas, 1.0 / np.hypot(*line.T)])[is_wall]
     return told
