@@ -7,7 +7,9 @@ from dataclasses import replace
 from nscan_cli.calibration.estimate import Estimate
 from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.robot_calibration import Calibration
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.beam_mask import mask_text
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions, sectors_from
 
 DECIMALS = 4
 """Decimals of the lengths, angles, times and relative scales that are passed on: ten times finer than what a
@@ -49,6 +51,22 @@ def calibrated_reading(
     if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= least:
         found = replace(found, clock_offset=round(clock.value, DECIMALS))
     return found
+
+
+def as_put_right(log: LaserLog, reading: ReadingOptions) -> ReadingOptions:
+    """The options that say what reading a log has put right of its laser: unit and offset of the ranges, and
+    beams that see the robot. `reading` are those that it was read with."""
+    used, masked = log.report.used, log.report.masked
+    found = reading
+    if reading.range_scale is None and "range_scale" in used:
+        found = replace(found, range_scale=float(used["range_scale"]))
+    if reading.range_offset is None and "range_offset" in used:
+        found = replace(found, range_offset=float(used["range_offset"]))
+    return (
+        found
+        if reading.mask is not None or not masked
+        else replace(found, mask=sectors_from(mask_text(masked)))
+    )
 
 
 def _is_told(estimate: Estimate, bound: float, sigmas: float) -> bool:

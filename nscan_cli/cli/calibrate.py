@@ -117,13 +117,14 @@ class _Calibrated:
 
     @classmethod
     def of(cls, scans: LaserLog, reading: ReadingOptions) -> _Calibrated:
-        from nscan_cli.calibration.calibrated_reading import calibrated_reading
+        from nscan_cli.calibration.calibrated_reading import as_put_right, calibrated_reading
         from nscan_cli.calibration.options import CalibrationOptions
         from nscan_cli.calibration.robot_calibration import calibrate
 
         options = CalibrationOptions()
         calibration = calibrate(scans, reading, options)
-        return cls(scans, reading, calibration, calibrated_reading(calibration, reading, options))
+        calibrated = calibrated_reading(calibration, reading, options)
+        return cls(scans, reading, calibration, as_put_right(scans, calibrated))
 
     def rows(self, with_name: bool) -> list[Row]:
         """The table for people."""

@@ -9,6 +9,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 
 ROBOT_OPTIONS = (
     "laser", "topic", "odom-topic", "flip", "mount", "sweep", "stamp", "odometry-scale", "clock-offset",
+    "range-scale", "range-offset", "mask",
 )  # fmt: skip
 """Their long names."""
 

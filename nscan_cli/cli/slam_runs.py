@@ -67,11 +67,13 @@ def run_on_log(
         compiling.beforehand_for_slam(early)
     load_runtime()
     scans = early or read(reading)
+    uncalibrated: list[str] = []
     if calibrated:
-        recorded, reading = reading, _calibrated(scans, reading, quiet)
+        recorded = reading
+        reading, uncalibrated = _calibrated(scans, reading, quiet)
         if reading != recorded:
             scans = read(reading)
-    warnings = scans.report.notices()
+    warnings = [*uncalibrated, *scans.report.notices()]
     for warning in warnings:
         say(f"warning: {warning}", quiet)
     with progress("mapping", len(scans), quiet) as bar:
@@ -96,6 +98,7 @@ def run_on_log(
     later = notices_of_mapping(scans, graph)
     for warning in later:
         say(f"warning: {warning}", quiet)
+    graph.provenance["notices"] += uncalibrated
     facts = graph_facts(graph) | {
         "duration": float(scans.times[-1] - scans.times[0]),
         "tracking": {
@@ -109,8 +112,9 @@ def run_on_log(
     return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), facts, compiling.has_begun)
 
 
-def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> ReadingOptions:
-    """The options that read the log as its calibration says, which are told; the same if it says nothing."""
+def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> tuple[ReadingOptions, list[str]]:
+    """The options that read the log as its calibration says, which are told; the same if it says nothing, and
+    why."""
     from nscan_cli.calibration.calibrated_reading import calibrated_reading
     from nscan_cli.calibration.options import CalibrationOptions
     from nscan_cli.calibration.robot_calibration import calibrate
@@ -119,10 +123,9 @@ def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> Readin
     try:
         found = calibrated_reading(calibrate(scans, reading, options), reading, options)
     except InputDataError as error:
-        say(f"warning: not calibrated: {error}", quiet)
-        return reading
+        return reading, [f"not calibrated: {error}"]
     say(f"calibrated: {changed_flags(reading, found) or 'the file says what the scans say'}", quiet)
-    return found
+    return found, []
 
 
 def run_on_graph(

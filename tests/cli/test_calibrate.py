@@ -11,6 +11,8 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.load_graph import load_graph
+from nscan_cli.logs.load import read_log
+from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import CORRIDOR_LOG, TURNING_LOG, data_file
 from tests.logs.recordings.messages import START, Odom, S, Scan, Tf, Written, turned
 from tests.logs.recordings.ros import ros2
@@ -94,6 +96,32 @@ def test_the_file_is_a_config_of_every_command(tmp_path, capsys):
     assert run(["info", CORRIDOR_LOG, "--config", str(robot)]) == 0
     assert load_graph(str(graph)).provenance["parameters"]["reading"]["odometry_scale"] == 0.987
     capsys.readouterr()
+
+
+def test_what_reading_puts_right_is_in_the_file(tmp_path, capsys):
+    """Ranges in inches, of a laser that sees two posts of the robot."""
+    log = read_log(CORRIDOR_LOG)
+    ranges = np.array(log.ranges)
+    ranges[:, [20, 21, 22, 150, 151, 152]] = 0.3
+    path, robot = tmp_path / "room.log", tmp_path / "robot.toml"
+    path.write_bytes(with_own_angles(dataclasses.replace(log, ranges=ranges / np.float32(0.0254))))
+    assert run(["calibrate", str(path), "-o", str(robot)]) == 0
+    found = tomllib.loads(robot.read_text())
+    assert found["range-scale"] == 0.0254
+    assert found["mask"].count(":") == 2
+    assert "--range-scale 0.0254 --mask" in " ".join(capsys.readouterr().out.split())
+    # With it nothing is left to say.
+    assert run(["info", str(path), "--config", str(robot)]) == 0
+    said = capsys.readouterr()
+    assert "are in inches" not in said.out + said.err
+    assert "see the robot" not in said.out + said.err
+
+
+def test_slam_says_in_its_graph_that_a_log_was_not_calibrated(tmp_path, capsys):
+    graph = tmp_path / "graph.json"
+    assert run(["slam", CORRIDOR_LOG, "--no-odometry", "--calibrate", "--every", "4", "-o", str(graph)]) == 0
+    assert "warning: not calibrated: " in capsys.readouterr().err
+    assert any(said.startswith("not calibrated: ") for said in load_graph(str(graph)).provenance["notices"])
 
 
 def test_slam_calibrates_first(tmp_path, capsys):
