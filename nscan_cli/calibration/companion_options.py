@@ -55,9 +55,27 @@ class CompanionOptions:
     more."""
     bin_width: float = math.radians(2.0)
     """Bearings are left out in bins of this width, rad. A larger value leaves out more beside it."""
-    min_sector_share: float = 0.07
+    min_quarter_share: float = 0.85
+    """Least share of what scans see of it that is in the best quarter of all bearings, a mean over the
+    scans. It is 0.87 or more for carts and 0.98 for people, and at most 0.69 for dust at 0.1 m, 0.64 for
+    odometry that drifts and 0.81 for a laser that looks aside. A larger value finds less."""
+    region_scans: int = 2000
+    """Number of scans, evenly spread in time, that show where it can be, once it is found. More take
+    longer."""
+    min_sector_share: float = 0.04
     """Bearings are left out if it is seen there in more than this share of these scans. A larger value leaves
     out less."""
-    min_quarter_share: float = 0.75
-    """Least share of what is seen that the best quarter of all bearings has: it is 0.94 or more for a
-    cart or a follower, and 0.57 at most for dust and noise. A larger value finds less."""
+    reach_quantile: float = 0.98
+    """It is as far away as this quantile of its farthest readings, one of each scan. A larger value leaves
+    out more, also of walls beside it."""
+    reach_margin: float = 0.15
+    """Readings are left out up to this distance beyond that, m. A larger value leaves out more walls."""
+    min_covered_share: float = 0.98
+    """Least share of a scan's readings up to there for it to cover the laser. A smaller value takes narrow
+    rooms for it."""
+    min_covered_view: float = math.radians(240.0)
+    """Least view of a laser that it can cover, rad: what sees less sees nothing else in front of a wall, too.
+    A smaller value takes such places for it."""
+    min_covered: int = 2
+    """Least number of scans in which it covers the laser for near readings all around to be left out. A
+    larger value misses what swings round seldom."""

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nscan_cli.calibration.companion_options import CompanionOptions
+from nscan_cli.calibration.companion_region import where_it_is
 from nscan_cli.logs.beam_mask import Bearings, mask_beams, mask_text
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, Indices, Mask, are_known, compose, transform
+from nscan_cli.poses import Array, Mask, are_known, compose, transform
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Companion:
     share: float
     """Share of the checked scans in which it is on the robot's path."""
     sectors: list[Bearings]
-    """Sectors in which it is seen, in the laser's frame, rad."""
+    """Sectors in which it is seen, and the range up to which it is, in the laser's frame, rad and m."""
 
     @property
     def seen(self) -> str:
@@ -43,20 +44,28 @@ class Companion:
 def checked_companion(
     log: LaserLog, reading: ReadingOptions, options: CompanionOptions
 ) -> tuple[LaserLog, ReadingOptions, list[str]]:
-    """The log without the beams that see what goes along by its odometry, how it is read, messages."""
+    """The log without the readings of what goes along by its odometry, how it is read, messages."""
     found = None if log.odometry is None else find_companion(log, log.odometry, options)
     if found is None:
         return log, reading, []
     ranges = log.ranges.copy()
     mask_beams(ranges, log.angle_min, log.angle_increment, found.sectors)
     mask = found.mask(log.report.masked)
-    said = f"{found.seen}; its beams are left out, as by --mask {mask_text(mask)}; --as-recorded uses them"
+    said = (
+        f"{found.seen}; readings of it are left out, as by --mask {mask_text(mask)}; --as-recorded uses them"
+    )
     return replace(log, ranges=ranges), replace(reading, mask=mask), [said]
 
 
 def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Companion | None:
     """What goes along in a log whose robot moves through poses (S, 3), nan where unknown; None if nothing."""
     rows = np.flatnonzero(are_known(poses))
+
+    def seen(k: int) -> Array | None:
+        begin, end = np.searchsorted(at, along[k] + options.farthest * np.array([-1.0, 1.0]))
+        about = path[begin:end][np.abs(at[begin:end] - along[k]) > options.nearest]
+        return _seen(log, int(rows[k]), poses[rows[k]], about, options)
+
     steps = np.hypot(*np.diff(poses[rows, :2], axis=0).T)
     # Who jumps is not followed over the jump.
     along = np.append(0.0, np.cumsum(np.where(steps > options.longest_step, options.farthest, steps)))
@@ -66,29 +75,31 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
     path = np.stack([np.interp(at, along, column) for column in poses[rows, :2].T], axis=1)
     # Evenly by the way: a robot that stands tells nothing.
     some = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], options.scans)))
-    found, looked_at = list[Indices](), 0
+    found, looked_at = list[Array](), 0
     for part in range(options.first_of):
         for k in some[part :: options.first_of].tolist():
-            begin, end = np.searchsorted(at, along[k] + options.farthest * np.array([-1.0, 1.0]))
-            about = path[begin:end][np.abs(at[begin:end] - along[k]) > options.nearest]
-            seen = _seen(log, int(rows[k]), poses[rows[k]], about, options)
-            looked_at += seen is not None
-            if seen is not None and len(seen):
-                found.append(seen)
+            reach = seen(k)
+            looked_at += reach is not None
+            if reach is not None and reach.any():
+                found.append(reach)
         # Mostly nothing goes along, and a few scans show it.
         if len(found) < options.clear_share * looked_at:
             return None
-    share = len(found) / max(looked_at, 1)
-    if share < options.min_share or not _is_somewhere(found, log, options):
+    share, reaches = len(found) / max(looked_at, 1), np.array(found)
+    if share < options.min_share or not _is_somewhere(reaches, log, options):
         return None
-    return Companion(share, _sectors(found, options))
+    # A cart swings aside where the robot turns on the spot, which is no way.
+    often = np.linspace(0, len(rows) - 1, min(options.region_scans, len(rows))).astype(np.int64)
+    more = {int(rows[k]): reach for k in often.tolist() if (reach := seen(k)) is not None and reach.any()}
+    return Companion(share, where_it_is(log, np.array(list(more)), np.array(list(more.values())), options))
 
 
-def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Indices | None:
-    """The bins of bearings in which a scan at a pose (3,) sees something on the path (n, 2) around it.
+def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Array | None:
+    """How far (m) a scan at a pose (3,) sees something on the path (n, 2) around it, by bins of bearings.
 
-    None if no point of the path is far enough from the robot.
+    (b,), 0 where it does not; None if no point of the path is far enough from the robot.
     """
+    reach = np.zeros(round(2 * np.pi / options.bin_width))
     away = np.hypot(*(path - pose[:2]).T)
     if not (away > options.clearance).any():
         return None
@@ -104,13 +115,15 @@ def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionO
     places = transform(compose(pose, log.mount), ends)
     is_on_path = _is_on_path(places, path, options.radius)
     if np.count_nonzero(is_on_path) < options.min_beams:
-        return np.zeros(0, dtype=np.int64)
+        return reach
     # The rest of it is joined to that and not far away.
     middle = places[is_on_path].mean(axis=0)
     is_joined = np.hypot(*np.diff(places, axis=0).T) < options.max_gap
     groups = np.append(0, np.cumsum(~is_joined))
     is_of_it = np.isin(groups, groups[is_on_path]) & (np.hypot(*(places - middle).T) < options.max_size)
-    return np.unique(np.floor(np.mod(bearings[is_of_it], 2 * np.pi) / options.bin_width).astype(np.int64))
+    bins = np.floor(np.mod(bearings[is_of_it], 2 * np.pi) / options.bin_width).astype(np.int64)
+    np.maximum.at(reach, bins % len(reach), ranges[is_of_it])
+    return reach
 
 
 def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
@@ -120,36 +133,15 @@ def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
     return near
 
 
-def _is_somewhere(seen: list[Indices], log: LaserLog, options: CompanionOptions) -> bool:
-    """Whether bins of bearings are mostly seen in the same quarter of them: dust and noise are everywhere.
+def _is_somewhere(reaches: Array, log: LaserLog, options: CompanionOptions) -> bool:
+    """Whether scans mostly see it in the same quarter of all bearings: dust and noise are everywhere.
 
-    For a laser that sees less than three quarters of a turn, the quarter is a third of what it sees.
+    `reaches` (n, b) are those of `_seen`. For a laser that sees less than three quarters of a turn, the
+    quarter is a third of what it sees. A scan counts once, also if a cart that swings round fills it.
     """
     first, last, _ = field_of_view(log)
-    size, view = round(2 * np.pi / options.bin_width), abs(last - first) / options.bin_width
-    counts = np.sort(np.bincount(np.concatenate(seen), minlength=size))[::-1]
-    most = min(size // 4, round(view / 3))
-    return bool(counts[:most].sum() >= options.min_quarter_share * counts.sum())
-
-
-def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:
-    """The sectors of bins that are seen in more than a few of the scans, and a bin to each side."""
-    size = round(2 * np.pi / options.bin_width)
-    counts = np.bincount(np.concatenate(seen), minlength=size)[:size]
-    # No more than half of all: the rest is what the map is made from.
-    often = counts > max(options.min_sector_share * len(seen), int(np.sort(counts)[size // 2]))
-    chosen = often | np.roll(often, 1) | np.roll(often, -1)
-    begins = np.flatnonzero(chosen & ~np.roll(chosen, 1))
-    ends = np.flatnonzero(chosen & ~np.roll(chosen, -1)) + 1
-    # The last sector may go on beyond 0.
-    if len(ends) and ends[0] <= begins[0]:
-        ends = np.roll(ends, -1)
-    return [
-        (_bearing(begin * options.bin_width), _bearing(end * options.bin_width))
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
-    ]
-
-
-def _bearing(angle: float) -> float:
-    """An angle (rad) as a bearing from −π to π."""
-    return float(np.mod(angle + np.pi, 2 * np.pi) - np.pi)
+    view = round(abs(last - first) / options.bin_width / 3)
+    is_seen = reaches > 0.0
+    shares = np.sort((is_seen / is_seen.sum(axis=1, keepdims=True)).mean(axis=0))[::-1]
+    most = min(len(shares) // 4, view)
+    return bool(shares[:most].sum() >= options.min_quarter_share)

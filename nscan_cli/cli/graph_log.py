@@ -159,7 +159,7 @@ def _is_value_of(value: Any, kind: str) -> bool:
     if value is None:
         return "None" in kind
     if isinstance(value, list) and kind.startswith("tuple[tuple"):
-        return all(_are_numbers(part, 2) for part in value)
+        return all(_are_numbers(part, 2) or _are_numbers(part, 3) for part in value)
     if isinstance(value, list):
         return kind.startswith("tuple") and _are_numbers(value, 3)
     if isinstance(value, bool):

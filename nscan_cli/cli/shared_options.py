@@ -18,7 +18,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import path_of_name
-from nscan_cli.logs.reading_options import STAMPS, ReadingOptions, sectors_from
+from nscan_cli.logs.reading_options import STAMPS, ReadingOptions, sector_text, sectors_from
 
 Command = Callable[..., Any]
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
@@ -35,7 +35,7 @@ def pose_from(text: str) -> tuple[float, float, float]:
     return x, y, math.radians(degrees)
 
 
-def _mask_from(text: str) -> tuple[tuple[float, float], ...]:
+def _mask_from(text: str) -> tuple[tuple[float, ...], ...]:
     try:
         return sectors_from(text)
     except ValueError as error:
@@ -117,8 +117,8 @@ def reading_options(command: Command) -> Command:
         rare("--angle-increment", type=float, metavar="DEG",
              help="Angle from beam to beam. Default: that in the log."),
         rare("--mask", type=MASK,
-             help="Drop beams between bearings (degrees, counter-clockwise). Default: those that see "
-             "the robot."),
+             help="Drop beams between bearings (degrees, counter-clockwise); with @M only readings "
+             "nearer than M metres. Default: those that see the robot."),
         rare("--sweep", type=SWEEP, metavar=SWEEP.name, default="auto", show_default=True,
              help="Seconds of a full turn of the laser, so that each beam has its own time; negative if the "
              "readings are in the reverse order of time. off: all at once. auto: as the log says."),
@@ -229,7 +229,7 @@ def _as_toml(ctx: click.Context) -> str:
         if param.type is POSE:
             value = [value[0], value[1], math.degrees(value[2])]
         elif param.type is MASK:
-            value = [f"{math.degrees(first):.12g}:{math.degrees(last):.12g}" for first, last in value]
+            value = [sector_text(sector) for sector in value]
         elif isinstance(value, str):
             try:
                 value = os.fsencode(value).decode()

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.dead_beams import dead_beams
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.reading_options import SECTOR_PARTS, ReadingOptions
 from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import Array, Mask
 
-Bearings = tuple[float, float]
-"""A sector from the first counter-clockwise to the last, in the laser's frame, rad."""
+Bearings = tuple[float, ...]
+"""A sector from the first counter-clockwise to the last, in the laser's frame, rad; if a range (m) follows,
+only what is nearer."""
 BEARING_ROUNDING = 1e-5
 """rad; messages have 32 bits, logs and --mask have decimals of degrees."""
 
@@ -27,7 +28,7 @@ def masked_sectors(table: ScanTable, options: ReadingOptions) -> tuple[list[Bear
         return [], []
     found, constant = robot_parts(table), dead_beams(table)
     constant = [one for one in constant if not any(_is_within(one, part) for part in found)]
-    sectors = [(sector.first, sector.last) for sector in (*found, *constant)]
+    sectors: list[Bearings] = [(sector.first, sector.last) for sector in (*found, *constant)]
     left_out = f"are left out, as by --mask {mask_text(sectors)}; --as-recorded uses them"
     said = []
     if found:
@@ -52,9 +53,14 @@ def _ranges(found: Sequence[Sector]) -> str:
 
 
 def mask_text(sectors: Sequence[Bearings]) -> str:
-    """Sectors (rad) as --mask takes them, in degrees."""
-    degrees = ((math.degrees(first), math.degrees(last)) for first, last in sectors)
-    return ",".join(f"{round(first, 1):g}:{round(last, 1):g}" for first, last in degrees)
+    """Sectors (rad, and m) as --mask takes them, in degrees."""
+    return ",".join(
+        "@".join(
+            [f"{round(math.degrees(first), 1):g}:{round(math.degrees(last), 1):g}"]
+            + [f"{round(distance, 2):g}" for distance in nearer]
+        )
+        for first, last, *nearer in sectors
+    )
 
 
 def mask_beams(
@@ -62,23 +68,28 @@ def mask_beams(
 ) -> int:
     """Write nan for the beams of scans (S, B) in the sectors, in place; returns how many readings that were.
 
-    angle_min, angle_increment: (S,), rad.
+    ranges are in m; angle_min, angle_increment: (S,), rad.
     """
     if not sectors:
         return 0
     is_same = (angle_min == angle_min[0]).all() and (angle_increment == angle_increment[0]).all()
     rows = slice(0, 1) if is_same else slice(None)
     bearings = angle_min[rows, None] + angle_increment[rows, None] * np.arange(ranges.shape[1])
-    chosen = np.broadcast_to(in_sectors(bearings, sectors), ranges.shape)
+    # Readings nearer than this, (1, B) or (S, B), are left out.
+    limits = np.zeros(bearings.shape, dtype=ranges.dtype)
+    for sector in sectors:
+        chosen = in_sectors(bearings, [sector[:2]])
+        limits[chosen] = np.maximum(limits[chosen], sector[2] if len(sector) > SECTOR_PARTS else np.inf)
+    chosen = (ranges < limits) | np.isposinf(limits)
     count = int(np.count_nonzero(chosen & ~np.isnan(ranges)))
     ranges[chosen] = np.nan
     return count
 
 
 def in_sectors(bearings: Array, sectors: Sequence[Bearings]) -> Mask:
-    """Which of some bearings, rad, are in one of the sectors; of the same shape."""
+    """Which of some bearings, rad, are in one of the sectors of which nothing is read; of the same shape."""
     chosen = np.zeros(bearings.shape, dtype=np.bool_)
-    for first, last in sectors:
+    for first, last in (sector for sector in sectors if len(sector) == SECTOR_PARTS):
         chosen |= (
             np.mod(bearings - first + BEARING_ROUNDING, 2 * np.pi)
             <= _width(first, last) + 2 * BEARING_ROUNDING

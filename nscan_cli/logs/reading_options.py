@@ -10,6 +10,8 @@ from nscan_cli.errors import WrongUsageError
 
 STAMPS = ("first", "middle", "last")
 """The beams at whose time a scan may be stamped."""
+SECTOR_PARTS = 2
+"""Bearings of a sector of a mask; a range may follow."""
 LONGEST_TURN = 2.0
 """s; no laser that maps turns more slowly."""
 
@@ -40,9 +42,9 @@ class ReadingOptions:
     """Direction of the first beam, rad."""
     angle_increment: float | None = None
     """Angle from beam to beam, rad."""
-    mask: tuple[tuple[float, float], ...] | None = None
+    mask: tuple[tuple[float, ...], ...] | None = None
     """Sectors of beams that are not read: two bearings in the laser's frame each, from the first
-    counter-clockwise to the second, rad."""
+    counter-clockwise to the second, rad. With a range behind them, m, only nearer readings are not read."""
     sweep: float | None = None
     """Time that a sweep of the laser takes, s: beams are seen one after another. Negative if the
     readings are in the reverse order of time; 0: all are seen at once."""
@@ -89,8 +91,11 @@ class ReadingOptions:
             raise WrongUsageError(f"--stamp is {self.stamp!r}; give one of {', '.join(STAMPS)}")
         if self.odometry_scale == 0:
             raise WrongUsageError("--odometry-scale is 0; give the metres of one unit of odometry")
-        if not all(math.isfinite(bearing) for sector in self.mask or () for bearing in sector):
-            raise WrongUsageError("--mask has a bearing that is not a finite number")
+        for sector in self.mask or ():
+            if not all(math.isfinite(part) for part in sector):
+                raise WrongUsageError("--mask has a bearing or a range that is not a finite number")
+            if len(sector) > SECTOR_PARTS and sector[SECTOR_PARTS] <= 0:
+                raise WrongUsageError("--mask leaves out no reading nearer than 0; give a range above that")
         if self.start is not None and self.end is not None and self.start > self.end:
             raise WrongUsageError("--start is after --end; no scan lies between")
 
@@ -102,15 +107,27 @@ class ReadingOptions:
                 raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")
 
 
-def sectors_from(text: str) -> tuple[tuple[float, float], ...]:
-    """The sectors of a text as --mask takes it: FROM:TO,… in degrees. Raises ValueError if it is none."""
+def sectors_from(text: str) -> tuple[tuple[float, ...], ...]:
+    """The sectors of a text as --mask takes it: FROM:TO,… in degrees, or FROM:TO@M with a range in m.
+
+    Raises ValueError if it is none.
+    """
     sectors = []
     for part in text.split(","):
-        first, last = (math.radians(float(bearing)) for bearing in part.split(":"))
-        if not math.isfinite(first + last):
-            raise ValueError(f"{part} has no bearings")
-        sectors.append((first, last))
+        bearings, at, distance = part.partition("@")
+        first, last = (math.radians(float(bearing)) for bearing in bearings.split(":"))
+        sector = (first, last, float(distance)) if at else (first, last)
+        if not math.isfinite(sum(sector)) or (at and sector[-1] <= 0.0):
+            raise ValueError(f"{part} has no bearings, or no range above 0")
+        sectors.append(sector)
     return tuple(sectors)
+
+
+def sector_text(sector: tuple[float, ...]) -> str:
+    """A sector (rad, and m) as --mask takes it."""
+    first, last, *nearer = sector
+    bearings = f"{math.degrees(first):.12g}:{math.degrees(last):.12g}"
+    return "@".join([bearings, *(f"{distance:.12g}" for distance in nearer)])
 
 
 def as_tuples(value: Any) -> Any:

@@ -116,7 +116,7 @@ def _mount_pose(place: str, value: list[Any]) -> tuple[float, float, float]:
     return float(x), float(y), math.radians(degrees)
 
 
-def _mask_sectors(place: str, value: str) -> tuple[tuple[float, float], ...]:
+def _mask_sectors(place: str, value: str) -> tuple[tuple[float, ...], ...]:
     try:
         return sectors_from(value)
     except ValueError as error:

@@ -188,19 +188,23 @@ def test_a_mount_of_the_wrong_form_is_wrong_usage(calls, wrong, capsys):
     assert "--mount" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("wrong", ["1", "1:2:3", "a:b", "", "nan:1", "1:2,", "1,2"])
+@pytest.mark.parametrize(
+    "wrong", ["1", "1:2:3", "a:b", "", "nan:1", "1:2,", "1,2", "1:2@", "1:2@0", "1:2@inf", "1:2@1@2"]
+)
 def test_a_mask_of_the_wrong_form_is_wrong_usage(calls, wrong, capsys):
     assert run(["info", "some.log", "--mask", wrong]) == 2
     assert "--mask" in capsys.readouterr().err
 
 
 def test_a_dumped_mask_gives_the_same_beams_again(calls, capsys):
-    mask = called(calls, "--mask", "130.1:150,-150:-130")["reading"].mask
+    mask = called(calls, "--mask", "130.1:150,-150:-130@1.25")["reading"].mask
     capsys.readouterr()
-    assert run(["info", "some.log", "--mask", "130.1:150,-150:-130", "--dump-config"]) == 0
+    assert run(["info", "some.log", "--mask", "130.1:150,-150:-130@1.25", "--dump-config"]) == 0
     dumped = capsys.readouterr().out
-    assert 'mask = ["130.1:150", "-150:-130"]' in dumped
-    np.testing.assert_allclose(called(calls, *config(dumped))["reading"].mask, mask, rtol=1e-12)
+    assert 'mask = ["130.1:150", "-150:-130@1.25"]' in dumped
+    again = called(calls, *config(dumped))["reading"].mask
+    assert [len(sector) for sector in again] == [2, 3]
+    np.testing.assert_allclose(np.concatenate(again), np.concatenate(mask), rtol=1e-12)
 
 
 def test_dumped_settings_give_the_same_call_again(calls, capsys):

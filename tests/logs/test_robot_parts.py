@@ -183,8 +183,23 @@ def test_the_options_decide(tmp_path):
     assert masked.report.contradictions == ()
     hidden = np.isnan(masked.ranges).all(axis=0)
     np.testing.assert_array_equal(np.flatnonzero(hidden), [*range(10), *range(161, 180)])
-    with pytest.raises(WrongUsageError, match="--mask has a bearing that is not a finite number"):
+    with pytest.raises(WrongUsageError, match="--mask has a bearing or a range that is not a finite number"):
         ReadingOptions(mask=((math.nan, 1.0),))
+    with pytest.raises(WrongUsageError, match="--mask leaves out no reading nearer than 0"):
+        ReadingOptions(mask=((0.0, 1.0, 0.0),))
+
+
+def test_a_range_keeps_what_is_farther(tmp_path):
+    path = as_carmen(tmp_path, office_log(Laser()))
+    whole = read_log(path, ReadingOptions(as_recorded=True))
+    near = read_log(path, ReadingOptions(mask=((math.radians(69.5), math.radians(-79.5), 1.5),)))
+    masked = np.isnan(near.ranges) & ~np.isnan(whole.ranges)
+    inside = np.zeros(masked.shape, dtype=bool)
+    inside[:, [*range(11), *range(160, 180)]] = True
+    np.testing.assert_array_equal(masked, inside & (whole.ranges < 1.5))
+    assert near.report.lost["in masked sectors"] == masked.sum() > 0
+    both = ((math.radians(69.5), math.radians(-79.5), 1.5), (math.radians(80.5), math.radians(100.0)))
+    assert np.isnan(read_log(path, ReadingOptions(mask=both)).ranges[:, 171:]).all()
 
 
 LOGS = ["intel.log.gz", "fr079.log.gz", "mit-csail.log.gz", "mit-killian.log.gz", "fr-campus.log.gz",
