@@ -59,7 +59,7 @@ class CompanionOptions:
     """Least share of what scans see of it that is in the best quarter of all bearings, a mean over the
     scans. It is 0.87 or more for carts and 0.98 for people, and at most 0.69 for dust at 0.1 m, 0.64 for
     odometry that drifts and 0.81 for a laser that looks aside. A larger value finds less."""
-    region_scans: int = 2000
+    region_scans: int = 600
     """Number of scans, evenly spread in time, that show where it can be, once it is found. More take
     longer."""
     min_sector_share: float = 0.04

@@ -12,36 +12,36 @@ from nscan_cli.logs.beam_mask import Bearings
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.poses import Array, Mask
 
 
-def where_it_is(log: LaserLog, rows: Indices, reaches: Array, options: CompanionOptions) -> list[Bearings]:
-    """The sectors in which the scans of rows (n,) see it, and the range up to which.
+def where_it_is(log: LaserLog, reaches: Array, options: CompanionOptions) -> list[Bearings]:
+    """The sectors in which scans of a log see it, and the range up to which.
 
-    reaches: (n, b) how far (m) they see it, by bins of bearings from 0 on counter-clockwise; 0 where they do
+    reaches: (n, b) how far (m) some see it, by bins of bearings from 0 on counter-clockwise; 0 where they do
     not.
     """
     counts, size = np.count_nonzero(reaches, axis=0), reaches.shape[1]
     # No more than half of all: walls on the path are anywhere.
     usual = counts > max(options.min_sector_share * len(reaches), int(np.sort(counts)[size // 2]))
     found = _sectors(usual, reaches, options)
-    return found + _around(log, rows, max((sector[2] for sector in found), default=0.0), options)
+    return found + _around(log, max((sector[2] for sector in found), default=0.0), options)
 
 
-def _around(log: LaserLog, rows: Indices, reach: float, options: CompanionOptions) -> list[Bearings]:
-    """All bearings, up to a range, if scans of some rows (n,) see nothing else: it covers the laser.
+def _around(log: LaserLog, reach: float, options: CompanionOptions) -> list[Bearings]:
+    """All bearings, up to a range, if some scans see nothing else: it covers the laser.
 
     A cart on a short bar swings round the laser where the robot turns on the spot.
     """
     first, last, _ = field_of_view(log)
     if abs(last - first) < options.min_covered_view:
         return []
-    ranges = log.ranges[rows]
-    near, has = np.count_nonzero(ranges < reach, axis=1), np.count_nonzero(~np.isnan(ranges), axis=1)
+    near = np.count_nonzero(log.ranges < reach, axis=1)
+    has = np.count_nonzero(~np.isnan(log.ranges), axis=1)
     covered = (near > 0) & (near >= options.min_covered_share * has)
     if np.count_nonzero(covered) < options.min_covered:
         return []
-    inside = ranges[covered]
+    inside = log.ranges[covered]
     farthest = float(np.quantile(inside[inside < reach], options.reach_quantile))
     return [(-np.pi, np.pi, round(min(farthest + options.reach_margin, reach), 2))]
 

@@ -90,8 +90,8 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
         return None
     # A cart swings aside where the robot turns on the spot, which is no way.
     often = np.linspace(0, len(rows) - 1, min(options.region_scans, len(rows))).astype(np.int64)
-    more = {int(rows[k]): reach for k in often.tolist() if (reach := seen(k)) is not None and reach.any()}
-    return Companion(share, where_it_is(log, np.array(list(more)), np.array(list(more.values())), options))
+    found = [reach for k in often.tolist() if (reach := seen(k)) is not None and reach.any()]
+    return Companion(share, where_it_is(log, np.array(found), options))
 
 
 def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Array | None:

@@ -56,20 +56,15 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
-    signed, reversing = checked_signs(log, options.unsigned, options.steps)
-    known: KnownSteps = {}
-    findings = find_contradictions(signed, reading, options, known)
-    log, reading, late = checked_delay(log, reading, known, options)
-    if late:
-        signed, reversing = checked_signs(log, options.unsigned, options.steps)
-        findings = find_contradictions(signed, reading, options, known)
-    if any("odometry" in finding.corrected for finding in findings):
-        # Steps by scans may be those of someone who goes along, and odometry is right without his beams.
-        alone, masked, seen = checked_companion(signed, reading, options.companion)
-        without_him: KnownSteps = {}
-        if seen and not find_contradictions(alone, masked, options, without_him):
-            findings, signed, reading, log, known = [], alone, masked, alone, without_him
-            said += seen
+    motion, along = _compared(log, reading, options), list[str]()
+    if motion.findings or motion.reversing or motion.late:
+        # What the scans show may be someone who goes along, and odometry is right without his readings.
+        alone, masked, seen = checked_companion(log, reading, options.companion)
+        without_him = _compared(alone, masked, options) if seen else motion
+        if seen and not without_him.findings and without_him.measured >= options.min_steps:
+            motion, along = without_him, seen
+    log, reading, signed, known = motion.log, motion.reading, motion.signed, motion.known
+    findings, reversing, late = motion.findings, motion.reversing, motion.late
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
         turned = changed_view(log, reading, options, known)
@@ -92,16 +87,49 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if not is_mirror_image:
         # In the unit of the mounting.
         log = _agreeing(log, findings)
-    said += (
-        jitter + order + jumps + units + held + reversing + late + [finding.message for finding in findings]
-    )
+    said += jitter + order + jumps + units + held + reversing + late
+    said += [finding.message for finding in findings] + along
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)
         return CheckedFile(log, reading, said, is_elsewhere)
     is_checked = log.odometry is not None and bool(are_known(log.odometry).all())
-    log, reading, along = checked_companion(log, reading, options.companion)
-    return CheckedFile(log, reading, said + along, is_checked)
+    if not along:
+        log, reading, along = checked_companion(log, reading, options.companion)
+        said += along
+    return CheckedFile(log, reading, said, is_checked)
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """A log whose odometry is compared with its scans."""
+
+    log: LaserLog
+    """With the delay of its odometry put right."""
+    reading: ReadingOptions
+    signed: LaserLog
+    """With its signs put right, too."""
+    known: KnownSteps
+    findings: list[Finding]
+    reversing: list[str]
+    """Messages on the signs, and on the delay."""
+    late: list[str]
+
+    @property
+    def measured(self) -> int:
+        """The number of steps that the scans have measured."""
+        return sum(step is not None for step in self.known.values())
+
+
+def _compared(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> _Compared:
+    signed, reversing = checked_signs(log, options.unsigned, options.steps)
+    known: KnownSteps = {}
+    findings = find_contradictions(signed, reading, options, known)
+    log, reading, late = checked_delay(log, reading, known, options)
+    if late:
+        signed, reversing = checked_signs(log, options.unsigned, options.steps)
+        findings = find_contradictions(signed, reading, options, known)
+    return _Compared(log, reading, signed, known, findings, reversing, late)
 
 
 def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:

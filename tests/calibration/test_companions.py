@@ -14,6 +14,7 @@ from nscan_cli.calibration.companions import find_companion
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.unsigned_odometry import checked_signs
 from nscan_cli.logs.beam_mask import mask_beams
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -157,6 +158,26 @@ def test_nor_if_he_is_so_near_that_most_steps_by_scans_are_his():
     assert message.startswith("something goes along with the robot")
     assert checked.log.odometry is log.odometry
     assert find_contradictions(log, ReadingOptions(), FileCheckOptions(), {})
+
+
+def test_nor_are_its_signs_or_a_tilted_laser():
+    """Someone ahead stays there, as the floor ahead does, and falls back a little, as if the robot reversed."""
+    whole = read_log(str(data_file("mit-killian.log.gz")))
+    log, options = faults.leader(faults.taken(whole, slice(3500, 7000)), 0.6), FileCheckOptions()
+    assert checked_signs(log, options.unsigned, options.steps)[1]
+    assert "the scans stay the same" in find_contradictions(log, ReadingOptions(), options)[0].message
+    checked = checked_file(log, ReadingOptions(), options)
+    (message,) = checked.messages
+    assert message.startswith("something goes along with the robot")
+    assert checked.log.odometry is log.odometry
+    near = np.isnan(checked.log.ranges).sum() - np.isnan(log.ranges).sum()
+    assert near < 1.1 * np.count_nonzero(log.ranges < faults.taken(whole, slice(3500, 7000)).ranges)
+
+
+def test_odometry_that_is_wrong_is_not_believed_for_somebody_who_leads():
+    log = faults.mirrored(faults.leader(read_log(str(OFFICE_LOG)), 0.6))
+    messages = checked_file(log, ReadingOptions(), FileCheckOptions()).messages
+    assert not messages[0].startswith("something goes along")
 
 
 def test_dust_is_everywhere():
