@@ -161,7 +161,7 @@ def test_nor_if_he_is_so_near_that_most_steps_by_scans_are_his():
 
 
 def test_nor_are_its_signs_or_a_tilted_laser():
-    """Someone ahead stays there, as the floor ahead does, and falls back a little, as if the robot reversed."""
+    """Someone ahead stays there, as the floor ahead does, and falls back, as if the robot reversed."""
     whole = read_log(str(data_file("mit-killian.log.gz")))
     log, options = faults.leader(faults.taken(whole, slice(3500, 7000)), 0.6), FileCheckOptions()
     assert checked_signs(log, options.unsigned, options.steps)[1]

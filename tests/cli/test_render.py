@@ -187,12 +187,13 @@ def test_the_log_is_read_as_slam_has_read_it(room, capsys):
     assert origin["overridden"] - origin["plain"] == pytest.approx(2.0, abs=0.051)
 
 
-def test_the_mask_of_slam_holds(room):
+@pytest.mark.parametrize("sector", [[0.5, -0.5], [0.5, -0.5, 100.0]])
+def test_the_mask_of_slam_holds(room, sector):
     """Without a beam the map is that of no scan."""
     (room / "room.json").write_bytes(write_graph(graph_of(log_text())))
     assert run(["render", "room.json", "-o", "all.png", "--no-yaml"]) == 0
     graph = graph_of(log_text())
-    graph.provenance["parameters"] = {"reading": {"mask": [[0.5, -0.5]]}}
+    graph.provenance["parameters"] = {"reading": {"mask": [sector]}}
     (room / "room.json").write_bytes(write_graph(graph))
     assert run(["render", "room.json", "-o", "part.png", "--no-yaml"]) == 0
     whole, part = (np.count_nonzero(picture(room / name) == 0) for name in ("all.png", "part.png"))

@@ -67,6 +67,7 @@ def check(log: LaserLog, parts: list[tuple[float, float, float]]) -> None:
         sectors((-170, -120, 0.6), (35, 55, 0.2)),
         sectors((100, 101, 0.4)),
         sectors((-90, -60, 1.2)),
+        sectors((-15, 15, 2.2)),
     ],
 )
 def test_posts_wheels_and_a_cart_are_found(parts):

@@ -203,7 +203,7 @@ def test_the_map_is_right_though_the_robot_has_itself_in_view(tmp_path):
     _, graph = map_log(read, options, SlamOptions(), 1, lambda *done: None)
     assert position_rmse(graph.poses, recording.truth) < 0.05
     assert any("--mask -61:-40,40:61" in notice for notice in graph.provenance["notices"])
-    assert graph.provenance["parameters"]["scan_checks"]["robot_parts"]["max_range"] == 1.5
+    assert graph.provenance["parameters"]["scan_checks"]["robot_parts"]["max_range"] == 2.5
     as_recorded = read_log(str(path), dataclasses.replace(options, as_recorded=True))
     assert position_rmse(mapped(as_recorded).graph.poses, recording.truth) < 0.05
 
