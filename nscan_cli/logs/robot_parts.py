@@ -23,8 +23,8 @@ class RobotPartsOptions:
     """When a beam sees the robot itself."""
 
     max_range: float = 2.5
-    """Range up to which parts of the robot are looked for, m. No real log has any up to here, and no excerpt of
-    300 or 800 scans. A larger value finds longer booms and carts."""
+    """Range up to which parts of the robot are looked for, m. No real log has any up to here, nor has an
+    excerpt of 300 or 800 scans. A larger value finds longer booms and carts."""
     relative_tolerance: float = 0.1
     """Greatest deviation of a constant range from its median, as a share of that. A larger value finds looser
     parts, and more walls of corners in which the robot turns."""
