@@ -26,6 +26,7 @@ from nscan_cli.calibration.step_evidence import (
     turns_agree,
 )
 from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.calibration.unsteady_stamps import unsteady_delay
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, wrap
@@ -68,6 +69,9 @@ def find_contradictions(
         found = _of_clocks(log, evidence.steps, reading, options, known)
         if found:
             return found
+    unsteady = unsteady_delay(log, evidence, options, known)
+    if unsteady is not None:
+        return [findings.unsteady_stamps(*unsteady, options.lag)]
     changed = _of_change(log, evidence, reading, options)
     if changed is not None:
         return [changed]

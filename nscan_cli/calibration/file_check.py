@@ -22,6 +22,8 @@ from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order
 from nscan_cli.calibration.range_jumps import checked_ranges
+from nscan_cli.calibration.reversed_headings import checked_headings
+from nscan_cli.calibration.scaled_stretches import checked_stretches
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.calibration.unsigned_odometry import checked_signs
 from nscan_cli.logs.laser_log import LaserLog
@@ -53,18 +55,21 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if order:
         compared = compare_ranges(log, options)
     log, jumps = checked_ranges(log, compared, options)
+    known: KnownSteps = {}
+    log, headings = checked_headings(log, options, known)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
-    motion, along = _compared(log, reading, options), list[str]()
-    if motion.findings or motion.reversing or motion.late:
+    motion, along = _compared(log, reading, options, known), list[str]()
+    if motion.findings or motion.said:
         # What the scans show may be someone who goes along, and odometry is right without his readings.
         alone, masked, seen = checked_companion(log, reading, options.companion)
-        without_him = _compared(alone, masked, options) if seen else motion
+        without_him = _compared(alone, masked, options, {}) if seen else motion
         if seen and not without_him.findings and without_him.measured >= options.min_steps:
             motion, along = without_him, seen
     log, reading, signed, known = motion.log, motion.reading, motion.signed, motion.known
-    findings, reversing, late = motion.findings, motion.reversing, motion.late
+    findings, stretched = motion.findings, motion.stretched
+    reversing, late = motion.reversing, motion.late
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
         turned = changed_view(log, reading, options, known)
@@ -87,7 +92,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if not is_mirror_image:
         # In the unit of the mounting.
         log = _agreeing(log, findings)
-    said += jitter + order + jumps + units + held + reversing + late
+    said += jitter + order + jumps + headings + units + held + stretched + reversing + late
     said += [finding.message for finding in findings] + along
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
@@ -105,14 +110,16 @@ class _Compared:
     """A log whose odometry is compared with its scans."""
 
     log: LaserLog
-    """With the delay of its odometry put right."""
+    """With the scale and the delay of its odometry put right."""
     reading: ReadingOptions
     signed: LaserLog
     """With its signs put right, too."""
     known: KnownSteps
+    """The steps that its scans have measured."""
     findings: list[Finding]
+    stretched: list[str]
+    """Messages on parts in another scale, on the signs, and on the delay."""
     reversing: list[str]
-    """Messages on the signs, and on the delay."""
     late: list[str]
 
     @property
@@ -120,16 +127,25 @@ class _Compared:
         """The number of steps that the scans have measured."""
         return sum(step is not None for step in self.known.values())
 
+    @property
+    def said(self) -> list[str]:
+        """All messages."""
+        return self.stretched + self.reversing + self.late
 
-def _compared(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> _Compared:
+
+def _compared(
+    log: LaserLog, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
+) -> _Compared:
+    """Compare a log; `known` are the steps that its scans have measured already, others are added."""
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
-    known: KnownSteps = {}
-    findings = find_contradictions(signed, reading, options, known)
+    findings, stretched = find_contradictions(signed, reading, options, known), list[str]()
+    if not any(finding.is_of_clocks for finding in findings):
+        log, stretched = checked_stretches(log, options, known)
     log, reading, late = checked_delay(log, reading, known, options)
-    if late:
+    if late or stretched:
         signed, reversing = checked_signs(log, options.unsigned, options.steps)
         findings = find_contradictions(signed, reading, options, known)
-    return _Compared(log, reading, signed, known, findings, reversing, late)
+    return _Compared(log, reading, signed, known, findings, stretched, reversing, late)
 
 
 def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:

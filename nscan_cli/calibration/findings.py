@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from nscan_cli.calibration.clock_offset import ClockOffset
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
+from nscan_cli.calibration.odometry_delay import TurnDelay
+from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange
 from nscan_cli.calibration.step_evidence import StepEvidence
@@ -77,6 +79,17 @@ def unexplained_turns(turns: TurnFit) -> Finding:
     )
 
 
+def unsteady_stamps(found: TurnDelay, steps: int, options: DelayOptions) -> Finding:
+    """Odometry fits at no offset of its stamps, in so many steps."""
+    said, cure = f"contradicts the scans at any offset of its stamps up to {options.longest:g} s", ""
+    if found.is_between and found.sigmas >= options.sigmas and abs(found.delay) >= options.least:
+        late = f"{abs(found.delay):.1f} s too {'early' if found.delay > 0.0 else 'late'}"
+        said = f"is stamped about {late}, and contradicts the scans even if moved"
+        cure = f", with --clock-offset {found.delay:.1f} moved by that"
+    evidence = f"turns differ by {found.left:.0%}, in {counted(steps, 'step')}"
+    return _unused(f"odometry {said}: {evidence}; stamps vary, or poses come too seldom", cure)
+
+
 def wrong_signs(evidence: StepEvidence, what: str) -> Finding:
     """With the sign of `what` changed the odometry agrees."""
     return _unused(
@@ -85,8 +98,8 @@ def wrong_signs(evidence: StepEvidence, what: str) -> Finding:
     )
 
 
-def _unused(evidence: str) -> Finding:
-    return Finding(f"{evidence}; it is not used; {UNDONE}", {"odometry": False})
+def _unused(evidence: str, cure: str = "") -> Finding:
+    return Finding(f"{evidence}; it is not used; {UNDONE}{cure}", {"odometry": False})
 
 
 def two_clocks(found: ClockOffset, reading: ReadingOptions) -> Finding:
@@ -112,8 +125,8 @@ def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool, is_
         ""
         if is_certain
         else (
-            "; if left and right are correct in the map, odometry turns the wrong way instead, and the map "
-            "is right, also with --no-odometry"
+            "; if left and right are correct in the map, odometry turns the wrong way instead, and "
+            f"{'the map is right' if is_mended else '--no-odometry maps it'}"
         )
     )
     return Finding(

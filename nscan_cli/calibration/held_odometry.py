@@ -6,6 +6,7 @@ If encoders fail and a gyroscope goes on, the position alone stands; the other w
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,12 +63,23 @@ def without_held(log: LaserLog, stretches: list[tuple[int, int]], options: HeldO
 
     Behind it, the headings fit the positions again.
     """
-    assert log.odometry is not None
+    log = without_rows(log, stretches)
+    if log.odometry is None:
+        return log
+    odometry = log.odometry.copy()
+    _turn_headings(odometry, [last + 1 for _, last in stretches], options)
+    path = None if log.odometry_path is None else robot_path(log.times, odometry)
+    return replace(log, odometry=odometry, odometry_path=path)
+
+
+def without_rows(log: LaserLog, stretches: Sequence[tuple[int, int]]) -> LaserLog:
+    """The log without its odometry after the first row of each stretch, up to its last."""
+    if log.odometry is None or not stretches:
+        return log
     odometry = log.odometry.copy()
     for first, last in stretches:
         odometry[first + 1 : last + 1] = np.nan
-    _turn_headings(odometry, [last + 1 for _, last in stretches], options)
-    # What was recorded between the scans stands still as well.
+    # What was recorded between the scans is wrong there as well.
     path = None if log.odometry_path is None else robot_path(log.times, odometry)
     return replace(log, odometry=odometry, odometry_path=path)
 

@@ -9,10 +9,11 @@ that differ by up to two minutes, of which a warning tells, or which `calibrate`
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
@@ -48,18 +49,48 @@ def checked_delay(
     return with_delay(log, delay), reading, [said_late(delay, delay, "because scans are matched by odometry")]
 
 
+class TurnDelay(NamedTuple):
+    """The delay with which turns by odometry fit best to those by scans."""
+
+    delay: float
+    """s to add to the stamps of odometry."""
+    left: float
+    """Sum of the differences of turns with it, as a share of the turns by scans; each is capped."""
+    as_stamped: float
+    """This share without a delay."""
+    sigmas: float
+    """Mean gain of the turns with it, in its standard deviations."""
+    is_between: bool
+    """Whether longer delays were tried on both sides."""
+
+
+def best_delay(log: LaserLog, steps: MeasuredSteps, options: DelayOptions, sign: float) -> TurnDelay | None:
+    """The delay of the odometry by steps of its scans; None for few turns. `sign` −1: of mirrored scans."""
+    return _best_delay(log, steps.first, steps.last, sign * steps.laser[:, 2], options)
+
+
 def _delay(
     log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions, sigmas: float
 ) -> float:
     """Seconds to add to the stamps of odometry, so that its turns fit those (n,) of the steps from rows to
     rows (n,); 0 in doubt: with a mean gain of fewer standard deviations than `sigmas`."""
+    found = _best_delay(log, first, last, turned, options)
+    if found is None or not found.is_between or found.sigmas < sigmas:
+        return 0.0
+    is_clear = found.left <= min(options.max_left * found.as_stamped, options.max_disagreement)
+    return found.delay if is_clear and abs(found.delay) >= options.least else 0.0
+
+
+def _best_delay(
+    log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions
+) -> TurnDelay | None:
     assert log.odometry is not None
     at, headings = log.times, log.odometry[:, 2]
     if log.odometry_path is not None:
         at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
     is_known, turns = np.isfinite(headings), np.abs(turned) >= options.min_turn
     if np.count_nonzero(turns) < options.min_turns or not is_known.any():
-        return 0.0
+        return None
     known = at[is_known], np.unwrap(headings[is_known])
     count = round(options.longest / options.step)
     delays = options.step * np.arange(-count, count + 1, dtype=np.float64)
@@ -71,11 +102,13 @@ def _delay(
     gains = off[count] - off[best]
     sigma = float(gains.std(ddof=1)) / np.sqrt(len(gains))
     whole = float(np.minimum(np.abs(turned), options.max_difference).mean())
-    is_clear = total[best] <= min(options.max_left * total[count], options.max_disagreement * whole)
-    if best in (0, 2 * count) or not is_clear or gains.mean() < sigmas * sigma:
-        return 0.0
-    delay = round(parabola_minimum(delays, total, options.fitted), 2)
-    return delay if abs(delay) >= options.least else 0.0
+    return TurnDelay(
+        round(parabola_minimum(delays, total, options.fitted), 2),
+        float(total[best]) / whole,
+        float(total[count]) / whole,
+        float(gains.mean()) / sigma if sigma > 0.0 else 0.0,
+        0 < best < 2 * count,
+    )
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:

@@ -6,6 +6,11 @@ import math
 from dataclasses import dataclass, field
 
 from nscan_cli.calibration.companion_options import CompanionOptions
+from nscan_cli.calibration.odometry_fault_options import (
+    ReversedHeadingOptions,
+    ScaledStretchOptions,
+    UnsteadyStampOptions,
+)
 from nscan_cli.calibration.odometry_options import (
     ClockOptions,
     DelayOptions,
@@ -86,6 +91,12 @@ class FileCheckOptions:
     """How the offset between the clocks of odometry and scans is looked for."""
     lag: DelayOptions = field(default_factory=DelayOptions)
     """When odometry is late or early, by the steps of any laser."""
+    unsteady: UnsteadyStampOptions = field(default_factory=UnsteadyStampOptions)
+    """When odometry fits the scans at no offset of its stamps."""
+    headings: ReversedHeadingOptions = field(default_factory=ReversedHeadingOptions)
+    """When headings by odometry count the wrong way, and its positions do not."""
+    stretches: ScaledStretchOptions = field(default_factory=ScaledStretchOptions)
+    """When the lengths of odometry are multiplied by something over a part of the log."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     """How the time of a laser's sweep is taken from its scans."""
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)

@@ -111,7 +111,7 @@ class StepEvidence:
         """The clearest change of scale along the steps."""
         if self.fit is None:
             return None
-        sigmas = _length_sigmas(self.laser, self.both.covariances)
+        sigmas = length_sigmas(self.laser, self.both.covariances)
         return scale_change(self.laser, self.odometry, sigmas, self.fit, self.options.change)
 
     def turn_change(self, least: int) -> TurnChange | None:
@@ -149,7 +149,7 @@ def _moves(steps: Array, least: float) -> Mask:
     return (np.hypot(steps[:, 0], steps[:, 1]) >= least) | (np.abs(steps[:, 2]) >= least)
 
 
-def _length_sigmas(laser: Array, covariances: Array) -> Array:
+def length_sigmas(laser: Array, covariances: Array) -> Array:
     """(n,) standard deviations of the lengths of steps (n, 3) with covariances (n, 3, 3), m."""
     lengths = np.hypot(laser[:, 0], laser[:, 1])
     along = laser[:, :2] / np.maximum(lengths, np.finfo(float).tiny)[:, None]

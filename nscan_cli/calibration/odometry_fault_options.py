@@ -1,0 +1,81 @@
+"""The parameters of what odometry itself, or a few steps of its scans, show to be wrong with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class UnsteadyStampOptions:
+    """When no offset makes odometry fit the scans, as where their stamps are now early and now late."""
+
+    max_disagreement: float = 0.4
+    """Turns fit at no offset if they disagree by more than this share of the turns by scans with the best
+    one. It is 0.56 at most on real logs, whose positions fit. A larger value finds less."""
+    max_turn_spread: float = 0.2
+    """A factor of turns does not explain that if their median residual is at least this share of them. It is
+    0.28 at most on real logs. A larger value finds less."""
+    max_tail: float = 0.17
+    """Positions do not fit, either, if the upper quartile of their residuals is more than this share of the
+    motion. It is 0.12 at most on real logs whose turns disagree. A larger value finds less."""
+    min_turns: int = 14
+    """Least number of steps with a turn, of a sample for the check of a file. A larger value finds less where
+    robots seldom turn."""
+    min_measured_share: float = 0.8
+    """Least share of the steps that scans measure. With a smaller one odometry is left out where it is needed
+    most."""
+
+
+@dataclass(frozen=True)
+class ReversedHeadingOptions:
+    """When the headings by odometry count the wrong way, and its positions do not."""
+
+    min_driven: float = 0.02
+    """Shortest step from scan to scan that tells which way the robot drives, m. A larger value needs faster
+    robots."""
+    min_driven_steps: int = 50
+    """Least number of these steps. A larger value finds less in short drives."""
+    min_agreement: float = 0.7
+    """Least length of the mean of the directions of these steps, in the robot's frame, if headings count the
+    other way: 1 if it always drives the same way. It is 0.89 to 1 on real logs. A larger value finds less."""
+    min_gain: float = 0.3
+    """This length must be smaller by so much as recorded. A larger value finds less, where robots drive
+    to and fro on one line."""
+    min_turns: int = 6
+    """Least number of steps with a turn by scans. A larger value finds less in short drives."""
+    min_opposite_share: float = 0.75
+    """Least share of these whose turn by odometry is opposite. A larger value finds less."""
+
+
+@dataclass(frozen=True)
+class ScaledStretchOptions:
+    """When the lengths of odometry are multiplied by something from a scan to another."""
+
+    min_factor: float = 2.5
+    """Least factor, or its inverse: no wheel slips so much. A larger value finds less."""
+    max_usual: float = 1.5
+    """Elsewhere the factor is this at most, or its inverse. A larger value finds more."""
+    min_length: float = 0.05
+    """Least length of a step by scans, m. With a larger value fewer steps count, and each tells more."""
+    max_turn: float = 1.5
+    """Largest turn of such a step for each metre, rad/m. A larger value lets more steps count, also those
+    that tell the place of the laser."""
+    max_sigma: float = 0.15
+    """Largest standard deviation of such a length, as a share of it. A larger value lets more steps count,
+    also those along bare walls."""
+    first_steps: int = 3
+    """More steps are measured where so many of the first few are off one after another. A larger value
+    misses shorter stretches."""
+    min_steps: int = 8
+    """Least number of steps in a stretch, and outside of all. A larger value finds less."""
+    beside: int = 2
+    """A step is off if most are of itself and so many on each side. A larger value misses shorter
+    stretches."""
+    max_spread: float = 0.2
+    """Largest median residual of the logarithms of the factors in a stretch. A larger value finds more, also
+    where matches fail."""
+    decimal_tolerance: float = 0.08
+    """A factor this near to a power of ten (relative) is that power. A larger value rounds more factors."""
+    bisections: int = 16
+    """Number of steps that are measured to find each end of a stretch. More find it more exactly and take
+    longer."""
