@@ -71,7 +71,7 @@ def find_contradictions(
             return found
     unsteady = unsteady_delay(log, evidence, options, known)
     if unsteady is not None:
-        return [findings.unsteady_stamps(*unsteady, options.lag)]
+        return [findings.unsteady_stamps(*unsteady, reading, options.lag)]
     changed = _of_change(log, evidence, reading, options)
     if changed is not None:
         return [changed]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from nscan_cli.calibration.clock_offset import ClockOffset
@@ -79,15 +79,16 @@ def unexplained_turns(turns: TurnFit) -> Finding:
     )
 
 
-def unsteady_stamps(found: TurnDelay, steps: int, options: DelayOptions) -> Finding:
+def unsteady_stamps(found: TurnDelay, steps: int, reading: ReadingOptions, options: DelayOptions) -> Finding:
     """Odometry fits at no offset of its stamps, in so many steps."""
     said, cure = f"contradicts the scans at any offset of its stamps up to {options.longest:g} s", ""
     if found.is_between and found.sigmas >= options.sigmas and abs(found.delay) >= options.least:
         late = f"{abs(found.delay):.1f} s too {'early' if found.delay > 0.0 else 'late'}"
         said = f"is stamped about {late}, and contradicts the scans even if moved"
-        cure = f", with --clock-offset {found.delay:.1f} moved by that"
+        cure = f", with --clock-offset {reading.clock_offset + found.delay:.1f} moved by that"
     evidence = f"turns differ by {found.left:.0%}, in {counted(steps, 'step')}"
-    return _unused(f"odometry {said}: {evidence}; stamps vary, or poses come too seldom", cure)
+    message = f"odometry {said}: {evidence}; stamps vary, or poses come too seldom"
+    return replace(_unused(message, cure), is_of_clocks=True)
 
 
 def wrong_signs(evidence: StepEvidence, what: str) -> Finding:

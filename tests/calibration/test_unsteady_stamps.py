@@ -69,6 +69,13 @@ def test_odometry_of_a_real_robot_that_is_late_besides_is_not_blamed_for_its_sca
     assert not [message for message in messages(late_drive(), OFF) if "stamps vary" in message]
 
 
+def test_what_seems_to_stand_because_it_is_late_is_not_named_besides():
+    log = odometry_faults.late(excerpt(read_log(str(data_file("intel.log.gz"))), slice(9000, 13630)), 1.0)
+    (said,) = messages(log)
+    assert "stamps vary" in said
+    assert any("stands still" in message for message in messages(log, OFF))
+
+
 def test_stamps_that_are_late_by_the_same_time_are_moved():
     (said,) = messages(odometry_faults.late(drive(), 0.6))
     assert said.startswith("odometry is stamped 0.61 s too late")
