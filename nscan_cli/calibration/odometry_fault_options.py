@@ -74,6 +74,9 @@ class ScaledStretchOptions:
     max_spread: float = 0.2
     """Largest median residual of the logarithms of the factors in a stretch. A larger value finds more, also
     where matches fail."""
+    max_unclear: float = 0.3
+    """A step tells on which side of an end it is if its scale is off that side's by this share of the
+    difference of both at most. A larger value needs fewer steps, and takes those beside an end for clear."""
     decimal_tolerance: float = 0.08
     """A factor this near to a power of ten (relative) is that power. A larger value rounds more factors."""
     bisections: int = 16

@@ -27,9 +27,6 @@ from nscan_cli.poses import Array, Indices, Mask
 PLACES = (0.5, 0.25, 0.75, 0.12, 0.38, 0.62, 0.88)
 """Where a step is measured to narrow down an interval, as shares of it: the next where one tells nothing."""
 
-UNCLEAR = 0.3
-"""A step tells on which side of an end it is if its scale is off that side's by a smaller share of both."""
-
 
 class ScaledStretch(NamedTuple):
     """A stretch over which odometry is multiplied by something."""
@@ -100,9 +97,9 @@ def scaled_stretches(log: LaserLog, options: FileCheckOptions, known: KnownSteps
         if not _is_nearer(np.array([-faster]), middle)[0]:
             continue
         # Single steps beside it may be off by something else.
-        inside = begin + np.flatnonzero(_is_clear(values[begin:end], middle, middle))
-        before = np.flatnonzero(_is_clear(values[: inside[0]], 0.0, middle))
-        behind = inside[-1] + 1 + np.flatnonzero(_is_clear(values[inside[-1] + 1 :], 0.0, middle))
+        inside = begin + np.flatnonzero(_is_clear(values[begin:end], middle, middle, some))
+        before = np.flatnonzero(_is_clear(values[: inside[0]], 0.0, middle, some))
+        behind = inside[-1] + 1 + np.flatnonzero(_is_clear(values[inside[-1] + 1 :], 0.0, middle, some))
         begins, ends = (0, 0), (len(log) - 1, len(log) - 1)
         if len(before):
             rows = int(told.last[before[-1]]), int(told.first[inside[0]])
@@ -146,9 +143,9 @@ def _is_nearer(values: Array, value: float) -> Mask:
     return nearer
 
 
-def _is_clear(values: Array, side: float, value: float) -> Mask:
+def _is_clear(values: Array, side: float, value: float, options: ScaledStretchOptions) -> Mask:
     """(n,) which values are clearly those of one side, 0 or `value`."""
-    clear: Mask = np.abs(values - side) <= UNCLEAR * abs(value)
+    clear: Mask = np.abs(values - side) <= options.max_unclear * abs(value)
     return clear
 
 
@@ -166,8 +163,8 @@ def _border(
     if behind <= before:
         return min(before, behind), max(before, behind)
     first, last = possible_steps(log, options.steps)
-    tried = 0
-    for _ in range(options.stretches.bisections):
+    tried, told_by = 0, options.stretches
+    for _ in range(told_by.bisections):
         within = np.flatnonzero((first >= before) & (last <= behind))
         if tried == len(PLACES) or len(within) < 2:
             break
@@ -176,9 +173,9 @@ def _border(
         places = middle + apart * np.arange(-2, 3)
         some = within[np.unique(np.clip(places, 0, len(within) - 1))]
         measured = _measured(log, np.array([first[some], last[some]]), options)
-        steps, values = _told(log, measured, options.stretches)
+        steps, values = _told(log, measured, told_by)
         sides = _is_nearer(values, value)
-        is_clear = _is_clear(values, 0.0, value) | _is_clear(values, value, value)
+        is_clear = _is_clear(values, 0.0, value, told_by) | _is_clear(values, value, value, told_by)
         if np.count_nonzero(is_clear) < 2 or len(set(sides[is_clear].tolist())) > 1:
             # The robot stands there, or no scans match, or it begins there.
             tried += 1
