@@ -6,6 +6,7 @@ the more. So every wall that is seen over a wide angle tells that length.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,11 +34,17 @@ class RangeOffsetOptions:
     max_nearness: float = 0.8
     """The near half of the walls are at most so far away, as a share of the far half. A larger value decides
     for more logs."""
+    max_by_angle: float = 0.17
+    """Longest length, as a share of the distances of walls, that may come from an angle between beams that is
+    wrong by less than its own check finds. A smaller value decides for more logs."""
     parts: int = 4
     """In each of so many parts of the log that shows walls enough most have to tell half of it: a round
     thing in a small room looks like a bent wall. More parts change fewer logs."""
     min_walls: int = 100
     """Least number of walls that decide. A larger value decides for fewer logs."""
+    min_distance: float = 0.5
+    """Nearest wall, m: what is nearer may be a part of the robot, or a small round thing. A smaller value
+    counts more of these."""
     max_range: float = 8.0
     """Farthest beam on a wall, m: the farther, the less it is bent. A larger value fits more walls."""
     max_ratio: float = 2.5
@@ -52,9 +59,11 @@ class RangeOffsetOptions:
     """Least standard deviation that beams are taken to have, m."""
     max_sigma: float = 0.06
     """Largest standard deviation of the length that a wall tells, m. A larger value counts more walls."""
-    min_offset: float = 0.06
-    """Three quarters of the walls, by weight, tell at least this length, m: it is -0.03 to 0.05 on real logs,
-    the most by lasers that measure too long. A larger value changes fewer logs."""
+    min_offset: float = 0.08
+    """Half of the walls, by weight, tell at least this length, m: it is -0.04 to 0.05 on real logs, the most
+    by lasers that measure too long. A larger value changes fewer logs."""
+    min_quartile: float = 0.03
+    """Three quarters of them tell at least this length, m. A larger value changes fewer logs."""
     bandwidth: float = 0.025
     """Width of the kernel with which the length that most walls tell is found, m."""
 
@@ -82,8 +91,11 @@ class WallOffsets(NamedTuple):
 
     def tell(self, options: RangeOffsetOptions) -> float:
         """The sign of the length that ranges are off by beyond doubt; 0 for none."""
-        low, high = self.quantile(0.25), self.quantile(0.75)
-        return 1.0 if low >= options.min_offset else -1.0 if high <= -options.min_offset else 0.0
+        middle = self.quantile(0.5)
+        sign = math.copysign(1.0, middle)
+        outer = self.quantile(0.25 if middle > 0.0 else 0.75)
+        is_told = sign * middle >= options.min_offset and sign * outer >= options.min_quartile
+        return sign if is_told else 0.0
 
     def is_of_ranges(self, options: RangeOffsetOptions) -> bool:
         """Whether near walls tell as much as far ones do. A wrong angle between beams bends walls, too, as if
@@ -95,6 +107,8 @@ class WallOffsets(NamedTuple):
         )
         if not len(near.offsets):
             return False
+        if abs(self.quantile(0.5)) > options.max_by_angle * float(np.median(self.distances)):
+            return True
         nearness = float(np.median(near.distances) / np.median(far.distances))
         share = near.quantile(0.5) / far.quantile(0.5)
         return nearness < options.max_nearness and share > 0.5 * (1.0 + nearness)
@@ -209,6 +223,8 @@ def _fitted(seen: Array, angles: Array, options: RangeOffsetOptions) -> Array:
     residuals = seen - offset[:, np.newaxis] - 1.0 / np.maximum(line @ wave.T, 0.5 / options.max_range)
     noise = np.sqrt((residuals**2).sum(axis=1) / (len(angles) - 3))
     sigmas = np.maximum(noise, options.least_noise) * np.sqrt(np.linalg.inv(normal)[:, 2, 2])
+    distances = 1.0 / np.hypot(*line.T)
     is_wall = (noise < options.max_residual) & (sigmas < options.max_sigma)
-    told: Array = np.column_stack([offset, sigmas, 1.0 / np.hypot(*line.T)])[is_wall]
+    is_wall &= distances > options.min_distance
+    told: Array = np.column_stack([offset, sigmas, distances])[is_wall]
     return told

@@ -81,4 +81,5 @@ def test_sound_logs_stay_as_they_are(name: str):
 @pytest.mark.parametrize("name", ["mit-csail", "intel", "fr079"])
 def test_real_logs_whose_ranges_are_15_cm_too_long(name: str):
     log = read_log(str(data_file(f"{name}.log.gz")))
-    assert offset(log, 0.15) == pytest.approx(-0.15, abs=0.04)
+    # Clutter looks like walls that are bent the other way.
+    assert offset(log, 0.15) == pytest.approx(-0.15, abs=0.06)
