@@ -14,6 +14,7 @@ import numpy as np
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.range_jump_options import RangeJumpOptions
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.predicted_ranges import beams_along, predicted_ranges
 from nscan_cli.poses import Array, Indices, compose, relative
 
 COMPARED_AT_ONCE = 512
@@ -71,7 +72,7 @@ def _ratios(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[A
     nan where there is none. The second are those as if the later scans were mirror images."""
     last, width = first + 1, log.ranges.shape[1]
     beams = np.arange(0, width, max(width // options.max_beams, 1))
-    steps = laser_steps(log, first, last)[:, :, None]
+    steps = laser_steps(log, first, last)
     lengths = log.ranges[first[0] : last[-1], beams].astype(np.float64)
     lengths[~np.isfinite(lengths)] = np.nan
     begin, between = log.angle_min[first, None], log.angle_increment[first, None]
@@ -79,8 +80,7 @@ def _ratios(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[A
         # Nearly all scans of a log have the same directions.
         begin, between = begin[:1], between[:1]
     angles = begin + beams * between
-    x, y = lengths * np.cos(angles) - steps[:, 0], lengths * np.sin(angles) - steps[:, 1]
-    predicted, directions = np.sqrt(x * x + y * y), np.arctan2(y, x) - steps[:, 2]
+    predicted, directions = predicted_ranges(lengths, angles, steps)
     predicted[predicted == 0.0] = np.nan
     as_read, mirrored = (_ranges_along(log, last, each) / predicted for each in (directions, -directions))
     return as_read, mirrored
@@ -88,14 +88,11 @@ def _ratios(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[A
 
 def _ranges_along(log: LaserLog, rows: Indices, directions: Array) -> Array:
     """(n, B) the ranges of scans in rows (n,) along directions (n, B), rad; nan for none."""
-    between = log.angle_increment[rows, None]
-    places = np.rint((directions - log.angle_min[rows, None]) / between)
-    around = np.round(2 * np.pi / np.abs(between))
-    # `%` takes six times as long.
-    places -= around * np.floor(places / around)
-    is_told = places < log.ranges.shape[1]
-    found = log.ranges[rows[:, None], np.where(is_told, places, 0.0).astype(np.int64)].astype(np.float64)
-    found[~(is_told & np.isfinite(found))] = np.nan
+    beams, has = beams_along(
+        directions, log.angle_min[rows, None], log.angle_increment[rows, None], log.ranges.shape[1]
+    )
+    found = log.ranges[rows[:, None], beams].astype(np.float64)
+    found[~(has & np.isfinite(found))] = np.nan
     return found
 
 

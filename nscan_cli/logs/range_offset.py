@@ -130,9 +130,10 @@ def checked_offset(
     if reading.range_offset is not None or reading.as_recorded or not len(ranges):
         return reading.range_offset or 0.0, []
     options = RangeOffsetOptions()
-    found = _wall_offsets(ranges, steps, options.scans[0], options)
-    if len(found.offsets) < options.min_walls < len(ranges):
-        found = _wall_offsets(ranges, steps, options.scans[1], options)
+    few, more = options.scans
+    found = _wall_offsets(ranges, steps, few, options)
+    if options.min_walls * few / more < len(found.offsets) < options.min_walls:
+        found = _wall_offsets(ranges, steps, more, options)
     if len(found.offsets) < options.min_walls:
         return 0.0, []
     sign = found.tell(options)

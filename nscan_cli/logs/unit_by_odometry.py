@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.logs.predicted_ranges import beams_along, predicted_ranges
 from nscan_cli.logs.range_unit import end_of_distances
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.robot_parts import evenly
@@ -257,17 +258,11 @@ def _as_predicted(
     begin, between = scans.directions(first)
     lengths = scans.of(first, scans.beams)
     angles = begin + between * np.arange(scans.raw.ranges.shape[1])[scans.beams]
-    x, y = lengths * np.cos(angles) - steps[:, :1], lengths * np.sin(angles) - steps[:, 1:2]
-    begin, between = scans.directions(last)
-    places = np.rint((np.arctan2(y, x) - steps[:, 2:] - begin) / between)
-    around = np.round(2.0 * np.pi / np.abs(between))
-    places -= around * np.floor(places / around)
-    is_told = places < scans.raw.ranges.shape[1]
-    seen: NDArray[np.float64] = np.take_along_axis(
-        scans.of(last, slice(None)), np.where(is_told, places, 0.0).astype(np.int64), axis=1
-    )
+    predicted, directions = predicted_ranges(lengths, angles, steps)
+    beams, has = beams_along(directions, *scans.directions(last), scans.raw.ranges.shape[1])
+    seen = np.take_along_axis(scans.of(last, slice(None)), beams, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        off = np.where(is_told, np.abs(np.log(seen / np.hypot(x, y))), np.nan)
+        off = np.where(has, np.abs(np.log(seen / predicted)), np.nan)
     count = np.count_nonzero(np.isfinite(off), axis=1)
     near = np.count_nonzero(off < options.tolerance, axis=1)
     share: Array = np.where(count >= options.min_beams, near / np.maximum(count, 1), np.nan)
