@@ -34,7 +34,7 @@ class VerificationOptions:
     different_step: float = 0.02
     """Two scans are compared if their relative poses on both paths differ by more than this, m and rad
     together. A smaller value compares more."""
-    min_gain: float = 0.2
+    min_gain: float = 0.1
     """A scan contradicts a repeat if the mean energy of its points, from -1 to -3 where they fit, is higher
     there than on the path by more than this. A larger value counts more repeats."""
     max_difference: float = 0.3
