@@ -20,6 +20,8 @@ from nscan_cli.poses import MIRRORED, Array, compose, relative
 from tests.calibration.test_file_check import drive, real_drive
 from tests.data import data_file
 from tests.simulation import faults
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import office
 
 OPTIONS = ViewChangeOptions()
 MOUNT = np.array([0.3, -0.1, 0.7])
@@ -93,6 +95,15 @@ def test_the_scan_from_which_readings_are_reversed_is_named(share):
     assert int(named[1]) - 60 <= at <= int(named[2]) + 60
     (said,) = said_of(faults.mirrored_in(whole, slice(0, at)))
     assert re.search(r"try --end [\d.]+ --flip, or --start [\d.]+;", said)
+
+
+@pytest.mark.parametrize("degrees", [90, 180])
+def test_a_round_laser_that_is_turned_is_no_robot_that_reverses(degrees: int):
+    """Seen from behind, the robot goes back; the odometry of that half would be reversed."""
+    round_laser = Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0, mount=(0.2, 0.0, 0.0))
+    whole = office().record_at(office().truth()[:700], 5, round_laser).log()
+    (said,) = said_of(faults.turned_in(whole, np.radians(degrees), slice(len(whole) // 2, None)))
+    assert f"the laser looks {degrees}°" in said
 
 
 @pytest.mark.parametrize("degrees", [30, 90, 180])
