@@ -79,17 +79,31 @@ def jumps_of(poses: Array, options: OdometryCheckOptions, times: Array | None = 
     if times is not None:
         periods = np.diff(times)
         pauses = np.maximum(periods / max(float(np.median(periods)), SHORTEST_PERIOD), 1.0)
-    jumps = np.zeros(len(steps), dtype=np.bool_)
     lengths, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
     # Most of the way a robot may go straight on, so that turns have no such ratio.
-    for size, ratio in ((lengths, options.longest_ratio), (turns, np.inf)):
-        moving = size[size > options.min_motion]
-        if len(moving):
-            usual = [options.step_quantile, options.most_quantile]
-            longest, most = np.quantile(moving, usual, method="lower")
-            longest = min(longest, ratio * most)
-            jumps |= size > np.maximum(options.jump_factor * longest, options.min_jump) * pauses
+    jumps = _long(lengths, pauses, options.longest_ratio, options)
+    jumps |= _long(turns, pauses, np.inf, options)
     return np.flatnonzero(jumps) + 1
+
+
+def _long(sizes: Array, pauses: Array, ratio: float, options: OdometryCheckOptions) -> Mask:
+    """(n,) which steps, of sizes (n,) in m or rad, are longer than the others; after a pause, given as a
+    multiple (n,) of the usual one, they may be longer in proportion.
+
+    Without the jumps that are found the usual longest step may be shorter, and others are jumps, too.
+    """
+    jumps: Mask = np.zeros(len(sizes), dtype=np.bool_)
+    while True:
+        moving = sizes[(sizes > options.min_motion) & ~jumps]
+        if not len(moving):
+            return jumps
+        usual = [options.step_quantile, options.most_quantile]
+        longest, most = np.quantile(moving, usual, method="lower")
+        longest = min(longest, ratio * most)
+        found = jumps | (sizes > np.maximum(options.jump_factor * longest, options.min_jump) * pauses)
+        if (found == jumps).all():
+            return jumps
+        jumps = found
 
 
 def frozen_scans(log: LaserLog, odometry: Array | None, options: OdometryCheckOptions) -> NDArray[np.int64]:

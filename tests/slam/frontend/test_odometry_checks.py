@@ -55,6 +55,15 @@ def test_counters_that_wrap_round_often_go_on():
     assert len(without_jumps(odometry, clock(150), as_before)[1]) == 0
 
 
+def test_a_shorter_jump_among_long_ones_is_one():
+    """Two long jumps in 120 steps are the usual longest step, and a tenth of one passes for usual."""
+    odometry = steady()
+    for row, way in ((20, 30.0), (60, 1.5), (100, 30.0)):
+        odometry[row:, 1] += way
+    _, jumps = without_jumps(odometry, clock(150), CHECKS)
+    assert jumps.tolist() == [20, 60, 100]
+
+
 def test_a_pause_in_which_the_robot_drove_on_is_believed():
     """2 m from scan to scan where 0.1 m are usual: 2 s of scans are missing."""
     rows = np.delete(np.arange(150), np.arange(20, 39))
