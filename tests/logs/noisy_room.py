@@ -25,8 +25,15 @@ def way(scans: int = SCANS) -> NDArray[np.float64]:
 
 
 def readings(scans: int = SCANS, beams: int = BEAMS, first: float = FIRST, step: float = STEP) -> Readings:
-    """(S, B) m, with 5 mm of noise."""
-    x, y, heading = way(scans).T[:, :, None]
+    """(S, B) m along the way, with 5 mm of noise."""
+    return readings_at(way(scans), beams, first, step)
+
+
+def readings_at(
+    poses: NDArray[np.float64], beams: int = BEAMS, first: float = FIRST, step: float = STEP
+) -> Readings:
+    """(S, B) m at poses (S, 3), with 5 mm of noise."""
+    x, y, heading = poses.T[:, :, None]
     angles = heading + first + step * np.arange(beams)
     with np.errstate(divide="ignore"):
         to_x = np.where(np.cos(angles) > 0, WIDTH - x, x) / np.abs(np.cos(angles))

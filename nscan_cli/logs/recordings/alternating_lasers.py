@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -30,15 +31,22 @@ class TwoLaserOptions:
     min_compared: int = 10
     """Least number of beams with a return in both of two scans that are compared. A larger value compares
     fewer scans."""
-    min_difference: float = 0.1
-    """Least difference between the scans of two lasers, as a share of the ranges. A larger value finds fewer
-    lasers; a smaller one takes noise for them."""
-    max_ratio: float = 0.5
+    min_difference: float = 0.05
+    """Least difference between the scans of two lasers, as a share of the ranges: it is 0.09 where one is
+    0.4 m ahead of the other in an office. A larger value finds fewer lasers; a smaller one takes noise for
+    them."""
+    max_ratio: float = 0.75
     """Greatest ratio of the difference between a scan and the second next to that between it and the next, if
     the second next is of the same laser. A larger value finds more lasers."""
-    min_share: float = 0.9
-    """Least share of scans with at most that ratio. One laser on a robot that drives has hardly any. A larger
-    value finds fewer lasers."""
+    missing_factor: float = 16.0
+    """A scan of one laser is missing if the others then resemble those of their laser so much more, in the
+    product of their differences. A larger value misses fewer."""
+    least_difference: float = 0.001
+    """Scans that differ less, as a share of the ranges, are alike. A larger value tells less of lasers that
+    see nearly the same."""
+    min_share: float = 0.6
+    """Least share of scans with at most that ratio: one laser on a robot that drives has 0.12 at most, and
+    two that look the same way have 0.75. A larger value finds fewer lasers."""
 
 
 def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
@@ -89,19 +97,38 @@ def _differences(scans: Sequence[ScanMessage], rows: Indices) -> tuple[float, fl
 def _is_first(scans: Sequence[ScanMessage]) -> NDArray[np.bool_]:
     """(S,) whether each scan is of the laser of the first one.
 
-    The lasers alternate, unless a scan is clearly more like the one before: then one of the other is missing.
+    The lasers alternate, unless one of a laser is missing: then two scans of the other follow each other.
+    Scans are shared out so that each resembles the one before of its laser, in the product of their
+    differences, and none is missing without need: where the robot turns on the spot a scan may well resemble
+    that of the other laser more.
     """
     options = TwoLaserOptions()
-    found = np.zeros(len(scans), dtype=np.bool_)
-    found[0] = True
-    latest: dict[bool, int] = {True: 0, False: 1}
+    before = np.array([
+        [
+            _difference(scan, scans[row - lag], options.min_compared) if row >= lag else np.nan
+            for lag in (1, 2, 3)
+        ]
+        for row, scan in enumerate(scans)
+    ])  # fmt: skip
+    costs = np.nan_to_num(np.log(np.maximum(before, options.least_difference)))
+    missing = math.log(options.missing_factor)
+    # Of a scan of the other laser than the one before, and of one of the same laser.
+    alternates, repeats = 0.0, math.inf
+    is_after_repeat: NDArray[np.bool_] = np.zeros((len(scans), 2), dtype=np.bool_)
     for row in range(2, len(scans)):
-        before = bool(found[row - 1])
-        same = _difference(scans[row], scans[latest[before]], options.min_compared)
-        other = _difference(scans[row], scans[latest[not before]], options.min_compared)
-        found[row] = before if same < options.max_ratio * other else not before
-        latest[bool(found[row])] = row
-    return found
+        to_latest, to_second, to_third = costs[row].tolist()
+        # The one before the two of the other laser.
+        ways = alternates + to_second, repeats + to_third
+        is_after_repeat[row] = ways[1] < ways[0], repeats < alternates
+        alternates, repeats = min(ways), min(alternates, repeats) + to_latest + missing
+    is_repeat: NDArray[np.bool_] = np.zeros(len(scans), dtype=np.bool_)
+    is_repeat[-1] = repeats < alternates
+    for row in range(len(scans) - 1, 1, -1):
+        is_repeat[row - 1] = is_after_repeat[row, int(is_repeat[row])]
+    changes = np.where(is_repeat, 0, 1)
+    changes[0] = 0
+    first: NDArray[np.bool_] = np.cumsum(changes) % 2 == 0
+    return first
 
 
 def _difference(one: ScanMessage, other: ScanMessage, min_compared: int) -> float:
