@@ -19,6 +19,7 @@ from nscan_cli.calibration.step_evidence import (
     explains_positions,
     is_change,
     is_excluded,
+    is_inverse,
     is_nearer,
     is_nearer_in_direction,
     is_wrong_scale,
@@ -262,6 +263,8 @@ def _of_positions(
     found = []
     if is_wrong_scale(fit, options):
         found.append(findings.wrong_scale(fit, reading, options))
+    if tell_place and evidence.turning_both >= options.min_steps and is_inverse(fit, mount, options):
+        return [*found, mount_findings.inverse_mounting(mount, fit)]
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]
     mounting = mount_findings.wrong_mounting(mount, fit, evidence.turning_both, options, tell_place)

@@ -13,7 +13,7 @@ from nscan_cli.calibration.step_evidence import is_nearer, is_wrong_scale
 from nscan_cli.calibration.view_change import DirectionChange
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, transform, wrap
+from nscan_cli.poses import Array, inverse, transform, wrap
 
 
 def changed_direction(
@@ -78,6 +78,19 @@ def wrong_mounting(
         cure += f", or --no-odometry if the headings of odometry are {degrees} too far to the {other}"
     what = f"the laser likely looks {degrees} further to the {side} than the file says"
     return Finding(f"{what}; {agree}; {cure}{AGREES}", seen_mount=seen, is_of_mount=True)
+
+
+def inverse_mounting(mount: Array, fit: MountFit) -> Finding:
+    """The mounting in the file, at `mount` (3,), is that of the robot as the laser sees it."""
+    seen = inverse(mount)
+    x, y = (f"{part:g}" for part in (np.round(seen[:2], 4) + 0.0).tolist())
+    return Finding(
+        "the mounting in the file is likely the wrong way round, that of the robot as the laser sees it: "
+        f"with its inverse scans and odometry agree about {counted(fit.steps, 'step')}; try "
+        f"--mount {x},{y},{_degrees(float(seen[2]))}{AGREES}",
+        seen_mount=seen,
+        is_of_mount=True,
+    )
 
 
 def opposite_directions(

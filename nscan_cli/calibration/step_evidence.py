@@ -12,7 +12,7 @@ from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_tu
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
-from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, transform, wrap
+from nscan_cli.poses import MIRRORED, Array, Mask, are_known, inverse, relative, transform, wrap
 
 
 class StepEvidence:
@@ -250,3 +250,17 @@ def is_nearer_in_direction(fit: MountFit, one: Array, other: Array, options: Fil
     off, from_other = (abs(float(wrap(fit.mount[2] - mount[2]))) for mount in (one, other))
     bound = max(options.min_mount_turn, options.mount_sigmas * float(fit.sigmas[3]))
     return off <= bound < from_other - bound
+
+
+def is_inverse(fit: MountFit, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether a fit is clearly that of the robot as the laser sees it, in place of the mounting (3,)."""
+    other = inverse(mount)
+    off = np.abs(fit.mount - other)
+    off[2] = abs(float(wrap(off[2])))
+    bounds = [options.min_mount_move, options.min_mount_move, options.min_mount_turn]
+    # Of a laser that looks ahead, or back, only the sign of its place would differ.
+    return (
+        bool((off <= np.maximum(bounds, options.mount_sigmas * fit.sigmas[1:])).all())
+        and is_nearer(fit, other, mount, options.mount_sigmas)
+        and is_nearer_in_direction(fit, other, mount, options)
+    )
