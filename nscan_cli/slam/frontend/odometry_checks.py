@@ -41,6 +41,9 @@ class OdometryCheckOptions:
     min_jump: float = 1.0
     """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
     fewer jumps."""
+    top_speed: float = 10.0
+    """No robot indoors is faster, m/s: with times a step is a jump, too, if it is faster and longer than the
+    quantile of most steps by `jump_factor`. A larger value finds fewer jumps among many."""
     stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
     """When odometry stood still, and then made up for it in one step."""
 
@@ -76,21 +79,24 @@ def jumps_of(poses: Array, options: OdometryCheckOptions, times: Array | None = 
     if len(poses) < 2:
         return np.zeros(0, dtype=np.int64)
     steps, pauses = relative(poses[1:], poses[:-1]), np.ones(len(poses) - 1)
+    possible = np.full(len(steps), np.inf)
     if times is not None:
         periods = np.diff(times)
         pauses = np.maximum(periods / max(float(np.median(periods)), SHORTEST_PERIOD), 1.0)
+        possible = options.top_speed * np.maximum(periods, SHORTEST_PERIOD)
     lengths, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
     # Most of the way a robot may go straight on, so that turns have no such ratio.
-    jumps = _long(lengths, pauses, options.longest_ratio, options)
-    jumps |= _long(turns, pauses, np.inf, options)
+    jumps = _long(lengths, pauses, possible, options.longest_ratio, options)
+    jumps |= _long(turns, pauses, np.full(len(steps), np.inf), np.inf, options)
     return np.flatnonzero(jumps) + 1
 
 
-def _long(sizes: Array, pauses: Array, ratio: float, options: OdometryCheckOptions) -> Mask:
+def _long(sizes: Array, pauses: Array, possible: Array, ratio: float, options: OdometryCheckOptions) -> Mask:
     """(n,) which steps, of sizes (n,) in m or rad, are longer than the others; after a pause, given as a
     multiple (n,) of the usual one, they may be longer in proportion.
 
-    Without the jumps that are found the usual longest step may be shorter, and others are jumps, too.
+    Beyond what is `possible` (n,) a step needs only be longer than most others. Without the jumps that are
+    found the usual longest step may be shorter, and others are jumps, too.
     """
     jumps: Mask = np.zeros(len(sizes), dtype=np.bool_)
     while True:
@@ -100,7 +106,8 @@ def _long(sizes: Array, pauses: Array, ratio: float, options: OdometryCheckOptio
         usual = [options.step_quantile, options.most_quantile]
         longest, most = np.quantile(moving, usual, method="lower")
         longest = min(longest, ratio * most)
-        found = jumps | (sizes > np.maximum(options.jump_factor * longest, options.min_jump) * pauses)
+        bounds = np.where(sizes > possible, min(longest, most), longest)
+        found = jumps | (sizes > np.maximum(options.jump_factor * bounds, options.min_jump) * pauses)
         if (found == jumps).all():
             return jumps
         jumps = found

@@ -51,8 +51,18 @@ def test_counters_that_wrap_round_often_go_on():
     believed, jumps = without_jumps(odometry, clock(150), CHECKS)
     assert jumps.tolist() == [30, 60, 90, 120]
     np.testing.assert_allclose(believed[-1], relative(steady()[-1], np.zeros(3)), atol=1e-9)
-    as_before = replace(CHECKS, longest_ratio=np.inf)
+    as_before = replace(CHECKS, longest_ratio=np.inf, top_speed=np.inf)
     assert len(without_jumps(odometry, clock(150), as_before)[1]) == 0
+
+
+def test_counters_that_wrap_round_in_a_tenth_of_the_steps_of_a_fast_robot_go_on():
+    """2 m in 0.1 s are ten times what is usual: fewer than twenty times, but faster than a robot is."""
+    odometry = steady(step=0.2)
+    odometry[:, 0] = np.mod(odometry[:, 0] + 0.1, 2.0)
+    _, jumps = without_jumps(odometry, clock(150), CHECKS)
+    assert jumps.tolist() == list(range(10, 150, 10))
+    slower = 10.0 * clock(150)
+    assert len(without_jumps(odometry, slower, CHECKS)[1]) == 0
 
 
 def test_a_shorter_jump_among_long_ones_is_one():
