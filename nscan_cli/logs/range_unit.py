@@ -164,7 +164,8 @@ def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = RangeUnitOpt
         (high < RangeLimitOptions.largest_range) & (high >= median) & (high * scale >= options.limits_apart)
     )
     if scale > 1.0:
-        shares_unit &= high < options.limits_apart
+        # Half of the returns would be beyond it otherwise.
+        shares_unit &= (high < options.limits_apart) | (median * scale > high)
     # That is assumed, in metres.
     shares_unit &= high != CARMEN_MAX_RANGE
     low = np.where(low >= options.limits_apart, low * scale, low)

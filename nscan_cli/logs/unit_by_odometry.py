@@ -29,6 +29,9 @@ SMALLER_UNITS = (
     ("feet", 0.3048),
 )
 """Units that readings may have instead of metres, in metres."""
+LARGER_UNITS = (("metres divided by 10", 10.0),)
+"""What they may have if a driver and its recorder take them for different units, in metres. Where they were
+divided by more their size tells it."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,8 @@ class UnitByOdometryOptions:
     min_median: float = 5.0
     """Only readings with a larger median may be in a unit smaller than a metre, m. A smaller value looks at
     more logs."""
+    max_median: float = 0.6
+    """Only readings with a smaller median may have been divided, m. A larger value looks at more logs."""
     max_same_share: float = 0.02
     """A value that more than this share of the readings have is a code and no distance. A larger value
     compares more readings."""
@@ -133,7 +138,11 @@ def unit_by_odometry(
     codes = values[counts > options.max_same_share * some.size]
     returns = some[(some < end) & ~np.isin(some, codes)]
     median = float(np.median(returns)) if returns.size else 0.0
-    if median < options.min_median:
+    if median >= options.min_median:
+        units = SMALLER_UNITS
+    elif 0.0 < median <= options.max_median:
+        units = LARGER_UNITS
+    else:
         return None
     steps = _Steps.of(odometry, mount, options)
     speed = steps.usual_speed(order.times)
@@ -143,7 +152,7 @@ def unit_by_odometry(
     if _explained(scans, steps, median, options) is not None:
         return None
     told = []
-    for name, scale in SMALLER_UNITS:
+    for name, scale in units:
         # Or odometry is in another unit, and the ranges are in metres.
         as_ranges = abs(math.log(median * scale / options.typical_median)) + _off(speed, options)
         as_odometry = abs(math.log(median / options.typical_median)) + _off(speed / scale, options)

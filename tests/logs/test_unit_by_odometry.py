@@ -16,7 +16,7 @@ from tests.data import SAMPLE_LOGS, data_file
 from tests.simulation.faults import ranges_scaled
 from tests.simulation.odometry_faults import scaled
 
-UNITS = [("inches", 0.0254), ("feet", 0.3048), ("decimetres", 0.1)]
+UNITS = [("inches", 0.0254), ("feet", 0.3048), ("decimetres", 0.1), ("metres divided by 10", 10.0)]
 REAL = ["fr079", "mit-csail", "fr-campus", "fr-clinic"]
 
 
@@ -72,8 +72,11 @@ def test_odometry_that_contradicts_all_units_tells_none(office: LaserLog, tmp_pa
     assert not any("odometry explains" in said for said in contradictions(in_file(shuffled, tmp_path, 0.01)))
 
 
-@pytest.mark.parametrize("name", REAL)
-@pytest.mark.parametrize(("unit", "scale"), UNITS)
+@pytest.mark.parametrize(
+    ("name", "unit", "scale"),
+    # Outdoors readings divided by 10 are as large as those of a small room.
+    [(name, *unit) for name in REAL for unit in UNITS if unit[1] < 1.0 or not name.startswith("fr-c")],
+)
 def test_units_of_real_logs(tmp_path: Path, name: str, unit: str, scale: float):
     log = read_log(str(data_file(f"{name}.log.gz")), ReadingOptions(end=600.0))
     assert log.range_scale == 1.0
