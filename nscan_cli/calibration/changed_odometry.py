@@ -25,12 +25,11 @@ def with_changed_odometry(log: LaserLog, change: Callable[[Array, Array], Array]
     )
 
 
-def with_mirrored_odometry(log: LaserLog) -> LaserLog:
-    """The log whose laser, on a robot that moves by odometry, moves as the mirror image of what it did:
-    readings in the wrong order show it so."""
-    mount = log.mount
+def with_mirrored_odometry(log: LaserLog, mount: Array) -> LaserLog:
+    """The log whose laser moves as the mirror image of one mounted at (3,) on the robot that moves by
+    odometry: readings in the wrong order show it so."""
     return with_changed_odometry(
-        log, lambda poses, _times: compose(compose(poses, mount) * MIRRORED, inverse(mount))
+        log, lambda poses, _times: compose(compose(poses, mount) * MIRRORED, inverse(log.mount))
     )
 
 

@@ -77,7 +77,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     is_mirror_image = any(finding.is_mirror_image for finding in findings)
     if is_mirror_image:
         # The ranges changed as its mirror image says.
-        signed, reversing = checked_signs(with_mirrored_odometry(log), options.unsigned, options.steps)
+        signed, reversing = checked_signs(_mirrored(log, findings), options.unsigned, options.steps)
     log = signed
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
@@ -146,6 +146,17 @@ def _compared(
         signed, reversing = checked_signs(log, options.unsigned, options.steps)
         findings = find_contradictions(signed, reading, options, known)
     return _Compared(log, reading, signed, known, findings, stretched, reversing, late)
+
+
+def _mirrored(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
+    """The log whose odometry is mirrored, and agrees with the scans as findings of mirrored scans see it."""
+    mount = log.mount
+    for finding in findings:
+        if finding.seen_scale is not None:
+            log = with_scaled_odometry(log, finding.seen_scale)
+        if finding.seen_mount is not None:
+            mount = finding.seen_mount
+    return with_mirrored_odometry(log, mount)
 
 
 def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:

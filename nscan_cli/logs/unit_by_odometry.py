@@ -8,6 +8,7 @@ step is too long or too short.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -138,12 +139,9 @@ def unit_by_odometry(
     codes = values[counts > options.max_same_share * some.size]
     returns = some[(some < end) & ~np.isin(some, codes)]
     median = float(np.median(returns)) if returns.size else 0.0
-    if median >= options.min_median:
-        units = SMALLER_UNITS
-    elif 0.0 < median <= options.max_median:
-        units = LARGER_UNITS
-    else:
+    if not 0.0 < median <= options.max_median and median < options.min_median:
         return None
+    units: Sequence[tuple[str, float]] = SMALLER_UNITS if median >= options.min_median else LARGER_UNITS
     steps = _Steps.of(odometry, mount, options)
     speed = steps.usual_speed(order.times)
     if speed == 0.0:
