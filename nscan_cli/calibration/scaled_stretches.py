@@ -20,6 +20,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robust_fit import median
 from nscan_cli.calibration.step_evidence import length_sigmas
 from nscan_cli.calibration.step_sampling import possible_steps, telling_steps
+from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.poses import Array, Indices, Mask
@@ -56,8 +57,9 @@ def checked_stretches(
         begin, end = log.numbers[each.begins[1]], log.numbers[each.ends[0]]
         metres = float(f"{each.scale:.3g}")
         said.append(
-            f"from scan {begin} to {end} one metre by odometry is {metres:g} m by scans, in {each.steps} "
-            "steps, and elsewhere about one: it is multiplied by that there; --as-recorded uses it as it is"
+            f"from scan {begin} to {end} one metre by odometry is {metres:g} m by scans, in "
+            f"{counted(each.steps, 'step')}, and elsewhere about one: it is multiplied by that there; "
+            "--as-recorded uses it as it is"
         )
     between = [ends for each in found for ends in (each.begins, each.ends) if ends[1] - ends[0] > 1]
     return without_rows(log, [(first, last - 1) for first, last in between]), said

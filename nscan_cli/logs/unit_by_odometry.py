@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.files.text import counted
 from nscan_cli.logs.predicted_ranges import beams_along, predicted_ranges
 from nscan_cli.logs.range_unit import end_of_distances
 from nscan_cli.logs.raw_scans import RawScans
@@ -112,8 +113,9 @@ class UnitByOdometry(NamedTuple):
         """The message if the unit is put right."""
         return (
             f"the ranges are in {self.name}: then odometry explains how they change, in "
-            f"{self.evidence.share:.0%} of {self.evidence.pairs} pairs of scans: they are multiplied by "
-            f"{self.scale:g}; --as-recorded leaves them as they are, --range-scale sets another factor"
+            f"{self.evidence.share:.0%} of {counted(self.evidence.pairs, 'pair')} of scans: they are "
+            f"multiplied by {self.scale:g}; --as-recorded leaves them as they are, --range-scale sets another "
+            "factor"
         )
 
 
