@@ -114,8 +114,8 @@ class UnitByOdometry(NamedTuple):
         return (
             f"the ranges are in {self.name}: then odometry explains how they change, in "
             f"{self.evidence.share:.0%} of {counted(self.evidence.pairs, 'pair')} of scans: they are "
-            f"multiplied by {self.scale:g}; --as-recorded leaves them as they are, --range-scale sets another "
-            "factor"
+            f"multiplied by {self.scale:g}; --as-recorded leaves them as they are, --range-scale sets "
+            "another factor"
         )
 
 
