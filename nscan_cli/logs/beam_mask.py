@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.dead_beams import dead_beams
-from nscan_cli.logs.reading_options import SECTOR_PARTS, ReadingOptions
+from nscan_cli.logs.reading_options import SECTOR_PARTS, ReadingOptions, sector_text
 from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import Array, Mask
 
@@ -54,13 +54,7 @@ def _ranges(found: Sequence[Sector]) -> str:
 
 def mask_text(sectors: Sequence[Bearings]) -> str:
     """Sectors (rad, and m) as --mask takes them, in degrees."""
-    return ",".join(
-        "@".join(
-            [f"{round(math.degrees(first), 1):g}:{round(math.degrees(last), 1):g}"]
-            + [f"{round(distance, 2):g}" for distance in nearer]
-        )
-        for first, last, *nearer in sectors
-    )
+    return ",".join(sector_text(sector, (1, 2)) for sector in sectors)
 
 
 def mask_beams(

@@ -123,11 +123,11 @@ def sectors_from(text: str) -> tuple[tuple[float, ...], ...]:
     return tuple(sectors)
 
 
-def sector_text(sector: tuple[float, ...]) -> str:
-    """A sector (rad, and m) as --mask takes it."""
+def sector_text(sector: tuple[float, ...], decimals: tuple[int, int] = (12, 12)) -> str:
+    """A sector (rad, and m) as --mask takes it, with so many decimals of degrees and of metres."""
     first, last, *nearer = sector
-    bearings = f"{math.degrees(first):.12g}:{math.degrees(last):.12g}"
-    return "@".join([bearings, *(f"{distance:.12g}" for distance in nearer)])
+    bearings = ":".join(f"{round(math.degrees(bearing), decimals[0]):.12g}" for bearing in (first, last))
+    return "@".join([bearings, *(f"{round(distance, decimals[1]):.12g}" for distance in nearer)])
 
 
 def as_tuples(value: Any) -> Any:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.reading_options import ReadingOptions, sectors_from
+from nscan_cli.logs.reading_options import ReadingOptions, sector_text, sectors_from
 
 RELATION_CHOICES = ("pairwise", "nscan", "both")
 MAPPING_PARAMETERS = {"max-scans": int, "relations": str, "no-loops": bool, "verify-bound": float}
@@ -35,7 +35,7 @@ class LogParameters:
             if key == "odometry":
                 table["no-odometry"] = True
             elif key == "mask":
-                table[key] = ",".join(f"{math.degrees(a):.9g}:{math.degrees(b):.9g}" for a, b in value)
+                table[key] = ",".join(sector_text(sector) for sector in value)
             elif key == "mount":
                 table[key] = [value[0], value[1], round(math.degrees(value[2]), 9)]
             else:

@@ -117,6 +117,13 @@ def test_what_reading_puts_right_is_in_the_file(tmp_path, capsys):
     assert "see the robot" not in said.out + said.err
 
 
+def test_a_mask_with_a_range_stays_in_the_file(tmp_path):
+    """An internal error: ranges of sectors had no place in a table."""
+    robot = tmp_path / "robot.toml"
+    assert run(["calibrate", CORRIDOR_LOG, "--mask", "80:90@1.5", "-o", str(robot)]) == 0
+    assert tomllib.loads(robot.read_text())["mask"] == "80:90@1.5"
+
+
 def test_slam_says_in_its_graph_that_a_log_was_not_calibrated(tmp_path, capsys):
     graph = tmp_path / "graph.json"
     assert run(["slam", CORRIDOR_LOG, "--no-odometry", "--calibrate", "--every", "4", "-o", str(graph)]) == 0

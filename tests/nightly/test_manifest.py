@@ -92,6 +92,11 @@ def test_parameters_as_a_table(tmp_path):
     assert parameters_from("", {"every": 1, "no-odometry": False}).as_table() == {}
 
 
+def test_a_mask_with_a_range_as_a_table():
+    table = {"mask": "130:150,-150:-130@1.5"}
+    assert parameters_from("", table).as_table() == table
+
+
 def test_parameters_are_options_of_slam(tmp_path):
     parameters = "parameters = { mount = [0.1, 0, 90], angle-min = -90, no-odometry = true, max-scans = 4 }"
     (entry,) = read(tmp_path, f'[[log]]\nname = "a"\n{parameters}')
