@@ -62,11 +62,9 @@ def as_put_right(log: LaserLog, reading: ReadingOptions) -> ReadingOptions:
         found = replace(found, range_scale=float(used["range_scale"]))
     if reading.range_offset is None and "range_offset" in used:
         found = replace(found, range_offset=float(used["range_offset"]))
-    return (
-        found
-        if reading.mask is not None or not masked
-        else replace(found, mask=sectors_from(mask_text(masked)))
-    )
+    if reading.mask is None and masked:
+        found = replace(found, mask=sectors_from(mask_text(masked)))
+    return found
 
 
 def _is_told(estimate: Estimate, bound: float, sigmas: float) -> bool:

@@ -16,6 +16,7 @@ from nscan_cli.logs.beam_mask import Bearings, mask_beams, mask_text
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_parts import evenly
 from nscan_cli.poses import Array, Mask, are_known, compose, transform
 
 
@@ -89,7 +90,7 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
     if share < options.min_share or not _is_somewhere(reaches, log, options):
         return None
     # A cart swings aside where the robot turns on the spot, which is no way.
-    often = np.linspace(0, len(rows) - 1, min(options.region_scans, len(rows))).astype(np.int64)
+    often = evenly(len(rows), options.region_scans)
     found = [reach for k in often.tolist() if (reach := seen(k)) is not None and reach.any()]
     return Companion(share, where_it_is(log, np.array(found), options))
 

@@ -17,6 +17,7 @@ from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names
+from nscan_cli.logs.robot_parts import evenly
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, Indices, relative, wrap
 
@@ -146,7 +147,7 @@ def _scans_turn(
     turns = np.flatnonzero(np.abs(scan_turns(log, begins, ends, options.scan_turns)) >= options.min_turn)
     if len(turns) < options.min_measured:
         return False
-    chosen = turns[np.unique(np.linspace(0, len(turns) - 1, options.more_steps).astype(np.int64))]
+    chosen = turns[evenly(len(turns), options.more_steps)]
     measured = measure_steps(log, (begins[chosen], ends[chosen]), steps).laser[:, 2]
     return bool(np.count_nonzero(np.abs(measured) >= options.min_turn) >= options.min_measured)
 
@@ -157,5 +158,5 @@ def _rows_within(
     """The rows where up to `count` steps begin and end that are spread from a row to another."""
     ends = np.searchsorted(log.times, log.times[first : last + 1] + steps.duration)
     within = np.flatnonzero(ends <= last)
-    some = within[np.unique(np.linspace(0, len(within) - 1, min(count, len(within))).astype(np.int64))]
+    some = within[evenly(len(within), count)]
     return first + some, ends[some]

@@ -244,10 +244,10 @@ def _explained(
     if len(near) < options.min_pairs:
         return None
     near = near[evenly(len(near), options.pairs)]
-    first, last, moved = steps.first[near], steps.last[near], steps.steps[near]
+    pairs, moved = _Pairs.of(scans, steps.first[near], steps.last[near]), steps.steps[near]
     lengths = 0.0, 1.0, options.beside, 1.0 / options.beside
     without, right, longer, shorter = (
-        _as_predicted(scans, first, last, moved * (length, length, 1.0), options) for length in lengths
+        pairs.as_predicted(moved * (length, length, 1.0), options) for length in lengths
     )
     gains = right - without
     is_told = np.isfinite(gains)
@@ -260,19 +260,36 @@ def _explained(
     return _Explained(share, float(gains.mean()), len(gains))
 
 
-def _as_predicted(
-    scans: _Readings, first: Indices, last: Indices, steps: Array, options: UnitByOdometryOptions
-) -> Array:
-    """(n,) share of the readings that are as the scan before predicts with steps (n, 3); nan for few."""
-    begin, between = scans.directions(first)
-    lengths = scans.of(first, scans.beams)
-    angles = begin + between * np.arange(scans.raw.ranges.shape[1])[scans.beams]
-    predicted, directions = predicted_ranges(lengths, angles, steps)
-    beams, has = beams_along(directions, *scans.directions(last), scans.raw.ranges.shape[1])
-    seen = np.take_along_axis(scans.of(last, slice(None)), beams, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        off = np.where(has, np.abs(np.log(seen / predicted)), np.nan)
-    count = np.count_nonzero(np.isfinite(off), axis=1)
-    near = np.count_nonzero(off < options.tolerance, axis=1)
-    share: Array = np.where(count >= options.min_beams, near / np.maximum(count, 1), np.nan)
-    return share
+class _Pairs(NamedTuple):
+    """The readings of n pairs of scans."""
+
+    lengths: Array
+    """(n, b) of some beams of the earlier scans."""
+    angles: Array
+    """(n, b) directions of these, rad."""
+    later: Array
+    """(n, B) all readings of the later scans."""
+    first: Array
+    """(n, 1) the first directions of these, rad."""
+    between: Array
+    """(n, 1) the angles from beam to beam, rad."""
+
+    @classmethod
+    def of(cls, scans: _Readings, first: Indices, last: Indices) -> _Pairs:
+        """The pairs of scans at positions (n,)."""
+        begin, between = scans.directions(first)
+        later = scans.of(last, slice(None))
+        angles = begin + between * np.arange(later.shape[1])[scans.beams]
+        return cls(scans.of(first, scans.beams), angles, later, *scans.directions(last))
+
+    def as_predicted(self, steps: Array, options: UnitByOdometryOptions) -> Array:
+        """(n,) share of the readings that are as the scan before predicts with steps (n, 3); nan for few."""
+        predicted, directions = predicted_ranges(self.lengths, self.angles, steps)
+        beams, has = beams_along(directions, self.first, self.between, self.later.shape[1])
+        seen = np.take_along_axis(self.later, beams, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.where(has, np.abs(np.log(seen / predicted)), np.nan)
+        count = np.count_nonzero(np.isfinite(off), axis=1)
+        near = np.count_nonzero(off < options.tolerance, axis=1)
+        share: Array = np.where(count >= options.min_beams, near / np.maximum(count, 1), np.nan)
+        return share

@@ -86,8 +86,6 @@ def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     most = state.options.degenerate_relations.most_steps
     already = {id(relation) for relation in state.saved_relations}
     widened = with_guess_variances(pairwise, nscan, state.route.rows, variances, most)
-    if not already:
-        return widened
     pairs = [old if id(old) in already else new for old, new in zip(pairwise, widened[0], strict=True)]
     return pairs, [old if id(old) in already else new for old, new in zip(nscan, widened[1], strict=True)]
 
