@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.calibration.driving_direction import driving_direction
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import HeldOdometryOptions
 from nscan_cli.calibration.options import StepOptions
@@ -103,12 +104,7 @@ def _turn_headings(odometry: Array, begins: list[int], options: HeldOdometryOpti
 
 def _usual_heading(odometry: Array, options: HeldOdometryOptions) -> float:
     """The way that the robot drives, in its own frame, rad; nan if there is no such one."""
-    steps = relative(odometry[1:], odometry[:-1])
-    moves = np.hypot(steps[:, 0], steps[:, 1]) > options.min_driven
-    if np.count_nonzero(moves) < options.min_driven_steps:
-        return np.nan
-    angles = np.arctan2(steps[moves, 1], steps[moves, 0])
-    mean = np.array([np.cos(angles).mean(), np.sin(angles).mean()])
+    mean = driving_direction(odometry, options.min_driven, options.min_driven_steps)
     is_one = float(np.hypot(*mean)) >= options.min_agreement
     return float(np.arctan2(mean[1], mean[0])) if is_one else np.nan
 

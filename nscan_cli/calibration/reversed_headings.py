@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.calibration.changed_odometry import with_changed_odometry
+from nscan_cli.calibration.driving_direction import driving_direction
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
 from nscan_cli.calibration.odometry_fault_options import ReversedHeadingOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, are_known, relative
+from nscan_cli.poses import Array, are_known
 
 HEADINGS_REVERSED = np.array([1.0, 1.0, -1.0])
 """Factors of poses."""
@@ -59,9 +60,4 @@ def contradict_positions(odometry: Array, options: ReversedHeadingOptions) -> bo
 
 def _agreement(poses: Array, options: ReversedHeadingOptions) -> float:
     """The length of the mean of the directions of steps, in the robot's frame; 0 for few."""
-    steps = relative(poses[1:], poses[:-1])
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    moves = lengths >= options.min_driven
-    if np.count_nonzero(moves) < options.min_driven_steps:
-        return 0.0
-    return float(np.hypot(*(steps[moves, :2] / lengths[moves, None]).mean(axis=0)))
+    return float(np.hypot(*driving_direction(poses, options.min_driven, options.min_driven_steps)))
