@@ -15,7 +15,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import are_known, compose, inverse, relative
+from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import bare_corridor
@@ -106,31 +106,6 @@ def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
     is_changed = re.search("odometry is (mirrored as well|changed to agree)", checked.messages[0])
     assert (checked.log is log) == (is_changed is None)
     assert checked.reading == ReadingOptions()
-
-
-@pytest.mark.parametrize("turned", [np.pi / 2, -0.8, 2.4])
-def test_a_transform_the_wrong_way_round(turned):
-    """The file says where the laser sees the robot."""
-    mount = np.array([0.3, 0.1, turned])
-    scene = round_scene()
-    log = scene.record_at(scene.truth(), 5, replace(scene.laser, mount=tuple(mount.tolist()))).log()
-    assert found(log) == []
-    (said,) = found(replace(log, mount=inverse(mount)))
-    assert re.search(rf"the wrong way round,.*try --mount 0.3,0.1,{np.degrees(turned):g};", said)
-
-
-def test_odometry_with_x_and_headings_reversed_agrees_meanwhile():
-    """It is the mirror image of a drive, and counts forward as backward."""
-    log = drive()
-    assert log.odometry is not None
-    checked = checked_file(
-        replace(log, odometry=log.odometry * (-1.0, 1.0, -1.0)), ReadingOptions(), FileCheckOptions()
-    )
-    assert "in the wrong order" in checked.messages[0]
-    assert "counts forward as backward" in checked.messages[1]
-    assert checked.log.odometry is not None
-    steps, right = (relative(poses[10:], poses[:-10]) for poses in (checked.log.odometry, log.odometry))
-    np.testing.assert_allclose(steps, right, atol=0.03)
 
 
 SCALES = (1000.0, 10.0, 0.1, 300.0)
