@@ -20,9 +20,9 @@ from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated_poses
+from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import poses_at, robot_path
+from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, Indices, are_known
 
 
@@ -123,8 +123,7 @@ def with_delay(log: LaserLog, delay: float) -> LaserLog:
     path = robot_path(path.times + delay, path.poses)
     if path is None:
         return log
-    odometry = np.where(are_known(odometry)[:, None], poses_at(path, log.times), np.nan)
-    return replace(log, odometry=odometry, odometry_path=path)
+    return replace(log, odometry=moved_odometry(odometry, path, log.times), odometry_path=path)
 
 
 def said_late(delay: float, offset: float, why: str) -> str:

@@ -18,9 +18,10 @@ from nscan_cli.logs.beam_mask import Bearings
 from nscan_cli.logs.beam_times import BeamTimes, deskewed_points
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
+from nscan_cli.logs.odometry_interpolation import moved_odometry
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import RobotPath, likelier_path, poses_at, robot_path
-from nscan_cli.poses import Array, Indices, are_known, compose
+from nscan_cli.logs.robot_path import RobotPath, likelier_path, robot_path
+from nscan_cli.poses import Array, Indices, compose
 
 SCANS_AT_ONCE = 256
 """Scans whose points are computed together."""
@@ -204,7 +205,7 @@ class LaserLog:
         if odometry is not None:
             path = path or robot_path(self.times, odometry)
             if path is not None:
-                odometry = np.where(are_known(odometry)[:, None], poses_at(path, times), np.nan)
+                odometry = moved_odometry(odometry, path, times)
         beams = BeamTimes(self.beam_times.first - middle, self.beam_times.step)
         return replace(self, times=times, odometry=odometry, odometry_path=path, beam_times=beams)
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.robot_path import RobotPath, poses_at
 from nscan_cli.logs.scan_order import nearest_in_time, usual_period
-from nscan_cli.poses import Array, relative, wrap
+from nscan_cli.poses import Array, are_known, relative, wrap
 
 
 @dataclass(frozen=True)
@@ -43,15 +44,40 @@ def interpolated_poses(times: Array, at: Array, poses: Array, name: str, warning
     columns = (poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2]))
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    in_gap, nearest = _in_gap(times, at, poses), nearest_in_time(at, times)
-    found[in_gap] = poses[nearest[in_gap]]
-    margin = OdometryGapOptions.beyond * usual_period(at)
-    missing = in_gap & (np.abs(times - at[nearest]) > margin)
+    missing, margin = _fill_gaps(found, times, at, poses), _margin(at)
     missing |= (times < at[0] - margin) | (times > at[-1] + margin)
     if missing.any():
         found[missing] = np.nan
         warnings.append(_missing_notice(missing, times, name))
     return found
+
+
+def moved_odometry(odometry: Array, path: RobotPath, times: Array) -> Array:
+    """The odometry (S, 3) of scans at other `times` (S,), s, by its path: nan where it was, and in gaps.
+
+    A scan that comes to lie in a gap has no more odometry than if it had been read there: how the robot came
+    from one end of a gap to the other is not known.
+    """
+    found = poses_at(path, times)
+    missing = _fill_gaps(found, times, path.times, path.poses) | ~are_known(odometry)
+    found[missing] = np.nan
+    return found
+
+
+def _fill_gaps(found: Array, times: Array, at: Array, poses: Array) -> NDArray[np.bool_]:
+    """Let the poses `found` (S, 3) at `times` (S,) that lie in gaps be the nearest of poses (P, 3) at (P,).
+
+    Returns which (S,) have none near.
+    """
+    in_gap, nearest = _in_gap(times, at, poses), nearest_in_time(at, times)
+    found[in_gap] = poses[nearest[in_gap]]
+    far: NDArray[np.bool_] = in_gap & (np.abs(times - at[nearest]) > _margin(at))
+    return far
+
+
+def _margin(at: Array) -> float:
+    """The time from a pose during which it is used, s, if poses are at the times `at` (P,)."""
+    return OdometryGapOptions.beyond * usual_period(at)
 
 
 def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
