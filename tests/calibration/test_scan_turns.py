@@ -58,3 +58,8 @@ def test_readings_that_go_clockwise_turn_the_same_way():
 def test_a_scan_has_not_turned_against_itself():
     rows = np.arange(5)
     np.testing.assert_allclose(scan_turns(drive(AHEAD), rows, rows, ScanTurnOptions()), 0.0, atol=1e-6)
+
+
+def test_between_no_scans_there_are_no_turns():
+    none = np.arange(0)
+    assert scan_turns(drive(AHEAD), none, none, ScanTurnOptions()).shape == (0,)
