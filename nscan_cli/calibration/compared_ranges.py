@@ -74,7 +74,7 @@ def _ratios(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[A
     beams = np.arange(0, width, max(width // options.max_beams, 1))
     steps = laser_steps(log, first, last)
     lengths = log.ranges[first[0] : last[-1], beams].astype(np.float64)
-    lengths[~np.isfinite(lengths)] = np.nan
+    np.copyto(lengths, np.nan, where=~np.isfinite(lengths))
     begin, between = log.angle_min[first, None], log.angle_increment[first, None]
     if (begin == begin[0]).all() and (between == between[0]).all():
         # Nearly all scans of a log have the same directions.

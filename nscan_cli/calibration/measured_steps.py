@@ -11,8 +11,8 @@ from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.correlative_search import likelihood_field, search
-from nscan_cli.matching.scan_pairs import match_scans
-from nscan_cli.matching.uncertainty import covariance_of, why_no_minimum
+from nscan_cli.matching.scan_pairs import ScanPair, match_scans
+from nscan_cli.matching.uncertainty import covariances_of, why_no_minimum
 from nscan_cli.poses import Array, Indices, Mask, relative
 
 KnownSteps = dict[tuple[int, int], tuple[Array, Array] | None]
@@ -83,34 +83,24 @@ def measure_steps(
         scan = thinned_scan(log, row, options)
         return None if scan is None else scan.points
 
+    known = {} if known is None else known
+    pairs = list(zip(rows[0].tolist(), rows[1].tolist(), strict=True))
+    new = [pair for pair in dict.fromkeys(pairs) if pair not in known]
     points = corrected or as_at_once
-    found: list[tuple[int, int, Array, Array]] = []
-    first, last = rows
-    for begin, end in zip(first.tolist(), last.tolist(), strict=True):
-        if known is not None and (begin, end) in known:
-            measured = known[begin, end]
-        else:
-            measured = _measured(points(begin), points(end), options)
-            if known is not None:
-                known[begin, end] = measured
-        if measured is not None:
-            found.append((begin, end, *measured))
-    ends = np.array([(begin, end) for begin, end, *_ in found], dtype=np.int64).reshape(-1, 2)
+    matches = [_matched(points(begin), points(end), options) for begin, end in new]
+    known.update(zip(new, _with_covariances(matches, options), strict=True))
+    found = [(pair, step) for pair in pairs if (step := known[pair]) is not None]
+    ends = np.array([pair for pair, _ in found], dtype=np.int64).reshape(-1, 2)
     return MeasuredSteps(
         ends[:, 0],
         ends[:, 1],
-        np.array([pose for _, _, pose, _ in found]).reshape(-1, 3),
-        np.array([covariance for *_, covariance in found]).reshape(-1, 3, 3),
+        np.array([pose for _, (pose, _) in found]).reshape(-1, 3),
+        np.array([covariance for _, (_, covariance) in found]).reshape(-1, 3, 3),
     )
 
 
-def _measured(
-    reference: Array | None, points: Array | None, options: StepOptions
-) -> tuple[Array, Array] | None:
-    """The pose of a scan's points (m, 2) in the frame of the reference (n, 2), and its covariance (3, 3).
-
-    None where it is in doubt.
-    """
+def _matched(reference: Array | None, points: Array | None, options: StepOptions) -> ScanPair | None:
+    """The match of a scan's points (m, 2) with the reference (n, 2); None where it is in doubt."""
     if reference is None or points is None:
         return None
     pair, probe, least = options.pair, options.probe, options.min_overlap
@@ -124,7 +114,20 @@ def _measured(
         match, least = match_scans(reference, points, found.pose, pair, probe), options.min_searched_overlap
     if not match.converged or match.overlap < least or match.apart > options.agreement:
         return None
-    covariance = covariance_of(match.information)
+    return match
+
+
+def _with_covariances(
+    matches: list[ScanPair | None], options: StepOptions
+) -> list[tuple[Array, Array] | None]:
+    """The pose of each match and its covariance; None where it is in doubt."""
+    known = [match for match in matches if match is not None]
+    covariances = iter(covariances_of(np.array([match.information for match in known]).reshape(-1, 3, 3)))
+    return [None if match is None else _step(match, next(covariances), options) for match in matches]
+
+
+def _step(match: ScanPair, covariance: Array | None, options: StepOptions) -> tuple[Array, Array] | None:
+    """The pose of a match and its covariance (3, 3); None where it is in doubt."""
     if covariance is None or why_no_minimum(match.gradient, covariance, options.pair.convergence) is not None:
         return None
     return match.pose, covariance

@@ -23,7 +23,7 @@ class ThinnedScan(NamedTuple):
 def thinned_scan(log: LaserLog, row: int, options: StepOptions) -> ThinnedScan | None:
     """The scan in a row of a log; None if it has too few usable beams for one Gaussian."""
     ranges, pair = log.ranges[row], options.pair
-    beams = np.flatnonzero(ranges <= pair.reach)
+    (beams,) = (ranges <= pair.reach).nonzero()
     if len(beams) < pair.minimum:
         return None
     beams = beams[:: max(len(ranges) // options.max_beams, 1)]

@@ -40,11 +40,19 @@ class Weakest(NamedTuple):
 
 def covariance_of(information: Array) -> Array | None:
     """The inverse of an information matrix (m, m); None when that is not positive definite."""
+    return covariances_of(information[None])[0]
+
+
+def covariances_of(information: Array) -> list[Array | None]:
+    """The `covariance_of` each of n information matrices (n, m, m)."""
     eigenvalues, vectors = np.linalg.eigh(information)
-    if not eigenvalues[0] > SINGULAR * eigenvalues[-1]:
-        return None
-    covariance: Array = (vectors / eigenvalues) @ vectors.T
-    return covariance
+    found: list[Array | None] = [None] * len(information)
+    definite = np.flatnonzero(eigenvalues[:, 0] > SINGULAR * eigenvalues[:, -1])
+    vectors = vectors[definite]
+    covariances = (vectors / eigenvalues[definite, None]) @ vectors.swapaxes(-1, -2)
+    for each, covariance in zip(definite.tolist(), covariances, strict=True):
+        found[each] = covariance
+    return found
 
 
 def decrement(gradient: Array, covariance: Array) -> float:

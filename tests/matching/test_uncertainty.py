@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.matching.pairwise import PairOptions
-from nscan_cli.matching.uncertainty import covariance_of, decrement, weakest_translation
+from nscan_cli.matching.uncertainty import covariance_of, covariances_of, decrement, weakest_translation
 
 WEAK = PairOptions().weak_sigma
 
@@ -18,6 +18,17 @@ def test_covariance_is_the_inverse_or_nothing():
     np.testing.assert_allclose(covariance, np.array([[9.0, -1.0], [-1.0, 4.0]]) / 35, rtol=1e-12)
     for hopeless in (np.zeros((3, 3)), np.diag([1.0, 0.0]), np.diag([1e9, 1e-4]), np.diag([1.0, -2.0])):
         assert covariance_of(hopeless) is None
+
+
+def test_of_several_matrices_each_has_its_own_inverse_or_none():
+    information = np.array([np.diag([4.0, 2.0]), np.diag([1.0, 0.0]), np.diag([8.0, 5.0])])
+    first, none, last = covariances_of(information)
+    assert first is not None
+    assert none is None
+    assert last is not None
+    np.testing.assert_allclose(first, np.diag([0.25, 0.5]))
+    np.testing.assert_allclose(last, np.diag([0.125, 0.2]))
+    assert covariances_of(np.zeros((0, 3, 3))) == []
 
 
 def test_decrement_counts_standard_deviations():
