@@ -183,9 +183,9 @@ class LaserLog:
         points, ends = points[near], np.append(0, np.cumsum(near))[ends]
         if self.beam_times is None:
             return points, ends, np.zeros(len(points))
-        scans, beams = (each[near] for each in np.nonzero(np.isfinite(self.ranges[rows])))
-        times = self.beam_times.of(rows)
-        return points, ends, times.first[scans] + times.step[scans] * beams
+        beams = self.beam_times.of(rows)
+        times = beams.first[:, None] + beams.step[:, None] * np.arange(self.ranges.shape[1])
+        return points, ends, times[np.isfinite(self.ranges[rows])][near]
 
     @property
     def middle_times(self) -> Array:

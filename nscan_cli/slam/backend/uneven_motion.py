@@ -37,14 +37,15 @@ def path_of_sweeps(
     if path is None or _is_fine(log, uneven):
         return path
     parts, thinned = uneven.parts, with_some_beams(log, max(log.ranges.shape[1] // uneven.max_beams, 1))
-    moving, times = replace(thinned, path=path), _times_of_knots(log.times, parts)
+    moving, still = replace(thinned, path=path), replace(thinned, path=None)
+    times = _times_of_knots(log.times, parts)
     knots, is_known = poses_at(path, times), np.arange(len(times)) % parts == 0
     knots[is_known] = poses
     outside, steps = ~np.isin(path.times, log.times), _known_steps(log.times, breaks, uneven)
     for first, last in _runs(_is_uneven(log.times, poses, steps, uneven), uneven.longest_run):
         # A scan more on each side: at the ends of what is matched nothing tells the motion beyond.
         before, after = first > 1 and steps[first - 2], last < len(steps) and steps[last]
-        run = _Run(moving, times, knots, (first - 1 - int(before), last + int(after)), options)
+        run = _Run(moving, still, times, knots, (first - 1 - int(before), last + int(after)), options)
         if run.match():
             inside = slice(parts * (first - 1), parts * last + 1)
             knots[inside], is_known[inside] = run.found(inside), True
@@ -105,19 +106,27 @@ class _Run:
     """Scans in uneven motion, and those on both sides that they are matched with."""
 
     def __init__(
-        self, moving: LaserLog, times: Array, knots: Array, rows: tuple[int, int], options: SlamOptions
+        self,
+        moving: LaserLog,
+        still: LaserLog,
+        times: Array,
+        knots: Array,
+        rows: tuple[int, int],
+        options: SlamOptions,
     ) -> None:
         """Find the path from the first to the last of `rows`, which is through `knots` (n, 3) so far.
 
         They are those of all scans, at `times` (n,), s. `moving` are the scans, with the path before any run
-        was matched.
+        was matched, `still` the same without a path.
         """
-        self._moving, self._rows, self._options = moving, rows, options
+        self._moving, self._still, self._rows, self._options = moving, still, rows, options
         (first, last), uneven = rows, options.uneven_motion
         around = slice(uneven.parts * first, uneven.parts * last + 1)
         self._start, self._times, self._all_knots = around.start, times[around], knots
         self._knots = knots[around].copy()
-        self._knots[:, 2] = np.unwrap(self._knots[:, 2])
+        # It takes longer than all else here, and hardly any path turns past π.
+        if np.abs(np.diff(self._knots[:, 2])).max() >= np.pi:
+            self._knots[:, 2] = np.unwrap(self._knots[:, 2])
         self._near = slice(max(first - uneven.scans, 0), last + 1 + uneven.scans)
 
     def found(self, knots: slice) -> Array:
@@ -152,7 +161,7 @@ class _Run:
     def _seen(self) -> TimedPoints:
         """The points of the scans in the time of the path, in order of time."""
         rows, reach = slice(self._rows[0], self._rows[1] + 1), self._options.tracking.max_range
-        points, ends, times = replace(self._moving, path=None).timed_points(rows, reach)
+        points, ends, times = self._still.timed_points(rows, reach)
         times += np.repeat(self._moving.times[rows], np.diff(ends))
         order = np.argsort(times, kind="stable")
         order = order[(times[order] >= self._times[0]) & (times[order] < self._times[-1])]

@@ -5,6 +5,7 @@ A few damped Newton steps, first with widened Gaussians and a part of the points
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -74,6 +75,7 @@ def match_uneven_path(
     return knots, gain
 
 
+@functools.cache
 def _band_pattern(nodes: int) -> Pattern:
     """The pattern of the factor where each of at least 3 nodes has blocks with the next two, in order."""
     columns = np.arange(nodes)

@@ -80,6 +80,8 @@ def free_space_violations(
     rows = route.rows
     if not len(rows) or log.ranges.shape[1] < 2:
         return None
+    if not _are_seen_again(log.laser_pose(route.poses), route.paths, nscan, options.min_keyframes):
+        return None
     to_laser = inverse(log.mount)
     points = [transform(to_laser, keyframe.points) for keyframe in route.keyframes[: len(route.poses)]]
     views = VisitViews(
@@ -109,6 +111,21 @@ def free_space_violations(
     first, last = rows[again[[worst, worst + size - 1]]].tolist()
     usual = float((within[:, 1] / within.sum(axis=1)).max()) if len(within) else np.nan
     return FreeSpaceViolation(float(shares[worst]), usual, first, last)
+
+
+def _are_seen_again(poses: Array, paths: Array, nscan: NScanOptions, least: int) -> bool:
+    """Whether at least so many keyframes have one of another visit within the radius of joint matches.
+
+    If few have, it need not be worked out what they saw. `poses` (K, 3) are those of the laser, at lengths of
+    path (K,), m.
+    """
+    older, again = np.searchsorted(paths, paths - nscan.visit_path), 0
+    for k in np.flatnonzero(older).tolist():
+        away = poses[: older[k], :2] - poses[k, :2]
+        again += int((np.hypot(away[:, 0], away[:, 1]) <= nscan.radius).any())
+        if again >= least:
+            return True
+    return False
 
 
 @kernel
