@@ -41,12 +41,18 @@ def main(*parts: str) -> None:
 
 def _track() -> None:
     """Map the drive from its first scan to the last."""
+    import numpy as np
+
+    from nscan_cli.calibration.scan_turns import scan_turns
+    from nscan_cli.calibration.sweep_options import ScanTurnOptions
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
     from nscan_cli.slam.log_to_graph import map_log, slam_options
     from nscan_cli.warm_up.simulated_drive import simulated_carmen_log
 
     log = log_from(simulated_carmen_log(), "warm-up.log")
+    # For headings that stand, and lasers that turn.
+    scan_turns(log, np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.int64), ScanTurnOptions())
     map_log(log, ReadingOptions(), slam_options(), THREADS, lambda *_progress: None)
 
 
