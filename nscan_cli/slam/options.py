@@ -30,6 +30,9 @@ class SystematicErrorOptions:
 
     window: float = 4.0
     """Length of the pieces of the path that are compared, m. Longer ones have less noise, and are fewer."""
+    short_window: float = 0.5
+    """Length of shorter pieces of the path, m: most of these are off, too. A shorter one has more noise, and
+    a longer one is more likely off by a jump of the odometry."""
     min_straightness: float = 0.5
     """Least distance between both ends of a piece, as a share of its length. A larger share leaves out more
     pieces with turns."""
@@ -41,8 +44,8 @@ class SystematicErrorOptions:
     parts: int = 4
     """Number of parts of the drive in each of which ways are off. More parts leave more odometry as it is."""
     min_part: float = 0.5
-    """Least share of the mean by which they are off in each part. A larger share leaves more odometry as it
-    is."""
+    """Least share of the mean by which they are off in each part, and in most short pieces. A larger share
+    leaves more odometry as it is."""
     min_length: float = 0.05
     """Least share by which ways are too long or too short. A larger share leaves more odometry as it is."""
     max_length: float = 0.4

@@ -87,13 +87,17 @@ def systematic_error(
     """
     if odometry is None or not are_known(odometry).any():
         return None
-    pieces = _pieces(poses, odometry, breaks, options)
+    pieces = _pieces(poses, odometry, breaks, options, options.window)
     if len(pieces) < options.min_pieces:
         return None
     means, sigmas = pieces.mean(axis=0), pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
     certain = np.where(np.abs(means) > options.sigmas * sigmas, means, 0.0)
     parts = np.array([part[:, 0].mean() for part in np.array_split(pieces, options.parts)])
     if not min_length <= abs(certain[0]) <= options.max_length or (parts / means[0] < options.min_part).any():
+        return None
+    # Odometry that jumps now and then has longer ways, too, but most of it is right.
+    short = _pieces(poses, odometry, breaks, options, options.short_window)
+    if len(short) and float(np.median(short[:, 0])) / means[0] < options.min_part:
         return None
     return SystematicError(1.0 + float(certain[0]), float(certain[1]))
 
@@ -103,9 +107,11 @@ def without_systematic_error(log: LaserLog, error: SystematicError) -> LaserLog:
     return with_changed_odometry(log, lambda poses, _times: _corrected(poses, error))
 
 
-def _pieces(poses: Array, odometry: Array, breaks: Sequence[int], options: SystematicErrorOptions) -> Array:
-    """(n, 2) by how much each piece of the path is longer by the map, as a share, and by how much it turns
-    more, rad/m.
+def _pieces(
+    poses: Array, odometry: Array, breaks: Sequence[int], options: SystematicErrorOptions, window: float
+) -> Array:
+    """(n, 2) by how much each piece of the path, of a length `window` (m), is longer by the map, as a share,
+    and by how much it turns more, rad/m.
 
     Pieces on which the robot turned around are left out: their ends tell no length.
     """
@@ -118,14 +124,14 @@ def _pieces(poses: Array, odometry: Array, breaks: Sequence[int], options: Syste
     for begin, end in zip(begins.tolist(), [*begins[1:].tolist(), len(known)], strict=True):
         # Each piece begins where the one before ends.
         at = begin
-        while (then := int(np.searchsorted(along[:end], along[at] + options.window))) < end:
+        while (then := int(np.searchsorted(along[:end], along[at] + window))) < end:
             ends.append((at, then))
             at = then
     first, last = known[np.array(ends, dtype=np.int64).reshape(-1, 2)].T
     by_map, by_odometry = relative(poses[last], poses[first]), relative(odometry[last], odometry[first])
     lengths, expected = (np.hypot(way[:, 0], way[:, 1]) for way in (by_map, by_odometry))
-    used = expected > options.min_straightness * options.window
-    turned = wrap(by_map[used, 2] - by_odometry[used, 2]) / options.window
+    used = expected > options.min_straightness * window
+    turned = wrap(by_map[used, 2] - by_odometry[used, 2]) / window
     return np.stack([lengths[used] / expected[used] - 1.0, turned], axis=1)
 
 

@@ -161,6 +161,14 @@ def wrapped(log: LaserLog, limit: float) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def jumping(log: LaserLog, every: int, step: Array) -> LaserLog:
+    """The odometry goes by `step` (3,) farther in every so many-th of its steps, as where a node is busy."""
+    odometry = _odometry(log)
+    steps = relative(odometry[1:], odometry[:-1])
+    steps[every - 1 :: every] += step
+    return replace(log, odometry=_summed(odometry[0], steps))
+
+
 def _summed(first: Array, steps: Array) -> Array:
     """(n + 1, 3) the poses to which steps (n, 3) lead from the first."""
     poses = [first]

@@ -129,3 +129,14 @@ def test_bare_corridors_are_as_long_as_they_are_with_odometry_that_is_too_long()
     as_recorded = map_drive(log, SlamOptions(), reading=ReadingOptions(as_recorded=True))
     assert rms(as_recorded.graph.poses, truth) > 0.2
     assert as_recorded.messages == []
+
+
+def test_jumps_of_odometry_are_no_error_of_all_of_it():
+    """They make ways longer in each part of the drive, but most of each part is right."""
+    poses = winding()
+    odometry = poses.copy()
+    for row in range(45, len(poses), 90):
+        odometry[row:, :2] += 1.5 * np.array([np.cos(poses[row, 2]), np.sin(poses[row, 2])])
+    assert systematic_error(poses, odometry, (), OPTIONS, LEAST) is None
+    believed = dataclasses.replace(OPTIONS, short_window=OPTIONS.window)
+    assert systematic_error(poses, odometry, (), believed, LEAST) is not None

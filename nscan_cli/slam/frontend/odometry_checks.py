@@ -30,20 +30,11 @@ class OdometryCheckOptions:
     """Least step that counts as motion, m and rad. A larger value ignores slow drives."""
     step_quantile: float = 0.99
     """Quantile of the log's steps that is the usual longest step. A larger value finds fewer jumps."""
-    most_quantile: float = 0.9
-    """Quantile of the steps' lengths below which hardly any is a jump: those of counters that wrap round are
-    several percent. A larger value finds fewer jumps."""
-    longest_ratio: float = 4.0
-    """The usual longest length is at most this multiple of that quantile: it is 3.3 at most on real logs. A
-    larger value finds fewer jumps."""
     jump_factor: float = 5.0
     """A jump is longer than this multiple of the usual longest step. A larger value finds fewer jumps."""
     min_jump: float = 1.0
     """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
     fewer jumps."""
-    top_speed: float = 10.0
-    """No robot indoors is faster, m/s: with times a step is a jump, too, if it is faster and longer than the
-    quantile of most steps by `jump_factor`. A larger value finds fewer jumps among many."""
     stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
     """When odometry stood still, and then made up for it in one step."""
 
@@ -79,38 +70,48 @@ def jumps_of(poses: Array, options: OdometryCheckOptions, times: Array | None = 
     if len(poses) < 2:
         return np.zeros(0, dtype=np.int64)
     steps, pauses = relative(poses[1:], poses[:-1]), np.ones(len(poses) - 1)
-    possible = np.full(len(steps), np.inf)
     if times is not None:
         periods = np.diff(times)
         pauses = np.maximum(periods / max(float(np.median(periods)), SHORTEST_PERIOD), 1.0)
-        possible = options.top_speed * np.maximum(periods, SHORTEST_PERIOD)
     lengths, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
-    # Most of the way a robot may go straight on, so that turns have no such ratio.
-    jumps = _long(lengths, pauses, possible, options.longest_ratio, options)
-    jumps |= _long(turns, pauses, np.full(len(steps), np.inf), np.inf, options)
+    jumps = _long(lengths, pauses, True, options) | _long(turns, pauses, False, options)
     return np.flatnonzero(jumps) + 1
 
 
-def _long(sizes: Array, pauses: Array, possible: Array, ratio: float, options: OdometryCheckOptions) -> Mask:
+def _long(sizes: Array, pauses: Array, is_length: bool, options: OdometryCheckOptions) -> Mask:
     """(n,) which steps, of sizes (n,) in m or rad, are longer than the others; after a pause, given as a
     multiple (n,) of the usual one, they may be longer in proportion.
 
-    Beyond what is `possible` (n,) a step needs only be longer than most others. Without the jumps that are
-    found the usual longest step may be shorter, and others are jumps, too.
+    A robot that drives as far in a step as it can does so in the step before or behind, too. So a length
+    counts as no more than the larger one of these: one that jumps now and then is no usual length. A turn may
+    take a single step. Without the jumps that are found the usual longest step may be shorter, and others are
+    jumps, too.
     """
     jumps: Mask = np.zeros(len(sizes), dtype=np.bool_)
     while True:
         moving = sizes[(sizes > options.min_motion) & ~jumps]
         if not len(moving):
             return jumps
-        usual = [options.step_quantile, options.most_quantile]
-        longest, most = np.quantile(moving, usual, method="lower")
-        longest = min(longest, ratio * most)
-        bounds = np.where(sizes > possible, min(longest, most), longest)
-        found = jumps | (sizes > np.maximum(options.jump_factor * bounds, options.min_jump) * pauses)
+        usual = _as_beside(moving) if is_length else moving
+        longest = np.quantile(usual, options.step_quantile, method="lower")
+        found = jumps | (sizes > max(options.jump_factor * longest, options.min_jump) * pauses)
         if (found == jumps).all():
             return jumps
         jumps = found
+
+
+def _as_beside(sizes: Array) -> Array:
+    """(n,) sizes of successive steps, each no larger than the larger one of those beside it.
+
+    Two of them, or one, tell nothing of each other.
+    """
+    if len(sizes) < 3:
+        return sizes
+    beside = np.zeros_like(sizes)
+    beside[1:] = sizes[:-1]
+    beside[:-1] = np.maximum(beside[:-1], sizes[1:])
+    found: Array = np.minimum(sizes, beside)
+    return found
 
 
 def frozen_scans(log: LaserLog, odometry: Array | None, options: OdometryCheckOptions) -> NDArray[np.int64]:
