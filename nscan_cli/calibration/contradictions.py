@@ -262,7 +262,7 @@ def _of_positions(
         return []
     found = []
     if is_wrong_scale(fit, options):
-        found.append(findings.wrong_scale(fit, reading, options))
+        found.append(findings.wrong_scale(fit, evidence.are_ranges_likelier(fit.scale), reading, options))
     if tell_place and evidence.turning_both >= options.min_steps and is_inverse(fit, mount, options):
         return [*found, mount_findings.inverse_mounting(mount, fit)]
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:

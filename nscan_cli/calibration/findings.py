@@ -148,7 +148,9 @@ def wrong_turns(turns: TurnFit) -> Finding:
     return Finding(f"odometry likely turns {what}: {turns_of(turns)}; try --no-odometry")
 
 
-def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOptions) -> Finding:
+def wrong_scale(
+    fit: MountFit, are_ranges_likelier: bool, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding:
     """Odometry counts in another unit than the ranges, beyond doubt or likely."""
     decimal = 10.0 ** round(math.log10(fit.scale))
     is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
@@ -164,6 +166,15 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
             )
     ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
     is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= options.max_range_factor
+    is_clear = max(fit.scale, 1.0 / fit.scale) > options.clear_scale_factor
+    if is_either and are_ranges_likelier:
+        length, size, speed = ("short", "small", "fast") if fit.scale < 1.0 else ("long", "large", "slow")
+        return Finding(
+            f"the ranges, and so the size of the map, are likely too {length}: {evidence}, and rooms "
+            f"are seldom so {size}, or robots so {speed}; try --range-scale {ranges}, or --odometry-scale "
+            f"{scale:g} if the size of the map is right{AGREES if is_clear else ''}",
+            seen_scale=fit.scale if is_clear else None,
+        )
     other = (
         f"; if the ranges, and so the size of the map, are wrong instead, --range-scale {ranges}"
         if is_either
@@ -174,7 +185,6 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
             f"{evidence}: its positions are multiplied, as by --odometry-scale {scale:g}{other}; {UNDONE}"
         )
         return Finding(message, {"odometry_scale": scale})
-    is_clear = max(fit.scale, 1.0 / fit.scale) > options.clear_scale_factor
     return Finding(
         f"the scale of odometry is likely wrong: {evidence}; try --odometry-scale {scale:g}{other}"
         f"{AGREES if is_clear else ''}",

@@ -54,7 +54,7 @@ def _growing(
         some = slice(part, None, parts)
         more = measure_steps(log, (first[some], last[some]), options.steps, known=known)
         steps = more if steps is None else steps.with_others(more)
-        yield StepEvidence(odometry, steps, options)
+        yield StepEvidence(log, odometry, steps, options)
 
 
 def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:

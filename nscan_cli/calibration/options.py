@@ -22,6 +22,7 @@ from nscan_cli.calibration.odometry_options import (
 )
 from nscan_cli.calibration.range_jump_options import BearingJitterOptions, OrderJumpOptions, RangeJumpOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.logs.expected_sizes import ExpectedSizes
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.pairwise import PairOptions
 
@@ -177,6 +178,11 @@ class FileCheckOptions:
     max_range_factor: float = 10.0
     """A warning of a wrong scale says that the ranges may be wrong instead, up to this factor: with a larger
     one they are not those of a room, as a user sees. A larger value says it more often."""
+    expected: ExpectedSizes = field(default_factory=ExpectedSizes)
+    """What tells whether ranges or odometry are likelier to be wrong by a factor."""
+    likelier_factor: float = 2.5
+    """The ranges are named first where they are likelier wrong than odometry by this factor. A larger value
+    names odometry more often."""
     max_turn_error: float = 0.3
     """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
     min_opposite_share: float = 0.8

@@ -12,14 +12,19 @@ from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_tu
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
+from nscan_cli.logs.expected_sizes import ranges_over_odometry
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import MIRRORED, Array, Mask, are_known, inverse, relative, transform, wrap
 
 
 class StepEvidence:
     """The steps by scans and by odometry, of those that have both."""
 
-    def __init__(self, odometry: Array, steps: MeasuredSteps, options: FileCheckOptions) -> None:
+    def __init__(
+        self, log: LaserLog, odometry: Array, steps: MeasuredSteps, options: FileCheckOptions
+    ) -> None:
         """`odometry` (S, 3) are the poses of all scans."""
+        self._log = log
         by_odometry = steps.odometry(odometry)
         self.steps, self.options, self.poses = steps, options, odometry
         known = are_known(by_odometry)
@@ -113,6 +118,19 @@ class StepEvidence:
             return None
         sigmas = length_sigmas(self.laser, self.both.covariances)
         return scale_change(self.laser, self.odometry, sigmas, self.fit, self.options.change)
+
+    def are_ranges_likelier(self, scale: float) -> bool:
+        """Whether the ranges are clearly likelier than odometry to be wrong, if one metre by odometry is
+        `scale` (m) by scans."""
+        moving, ends = self._is_moving, (self.both.first, self.both.last)
+        lasted = (self._log.times[ends[1]] - self._log.times[ends[0]])[moving]
+        speed = float(np.median(np.hypot(*self.odometry[moving, :2].T) / lasted))
+        seen, options = self._log.ranges[ends[0]], self.options
+        usual = float(np.median(seen[np.isfinite(seen)]))
+        return (
+            speed > 0.0
+            and ranges_over_odometry(usual, speed, 1.0 / scale, options.expected) > options.likelier_factor
+        )
 
     def turn_change(self, least: int) -> TurnChange | None:
         """The clearest change of the signs of turns, with at least so many turns before and behind."""

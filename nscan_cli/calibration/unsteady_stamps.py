@@ -37,7 +37,7 @@ def unsteady_delay(
     if found is None or found.left <= most or len(steps) < options.unsteady.min_measured_share * len(first):
         return None
     moved = with_delay(log, found.delay).at_middle_of_sweeps().odometry
-    there = None if moved is None else StepEvidence(moved, steps, options)
+    there = None if moved is None else StepEvidence(log, moved, steps, options)
     if there is None or not _is_rough(there, options.unsteady):
         return None
     tails = [fit.tail for fit in (there.fit, there.mirrored_fit) if fit is not None]

@@ -7,15 +7,15 @@ step is too long or too short.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
+from nscan_cli.logs.expected_sizes import ExpectedSizes, ranges_over_odometry
 from nscan_cli.logs.predicted_ranges import beams_along, predicted_ranges
 from nscan_cli.logs.range_unit import end_of_distances
 from nscan_cli.logs.raw_scans import RawScans
@@ -29,11 +29,18 @@ SMALLER_UNITS = (
     ("inches", 0.0254),
     ("decimetres", 0.1),
     ("feet", 0.3048),
+    ("millimetres taken for inches", 0.001 / 0.0254),
+    ("centimetres taken for feet", 0.01 / 0.3048),
+    ("millimetres taken for feet", 0.001 / 0.3048),
 )
-"""Units that readings may have instead of metres, in metres."""
-LARGER_UNITS = (("metres divided by 10", 10.0),)
-"""What they may have if a driver and its recorder take them for different units, in metres. Where they were
-divided by more their size tells it."""
+"""Units that readings may have instead of metres, in metres, also if a driver takes them for another unit
+than its laser has."""
+LARGER_UNITS = (
+    ("metres divided by 10", 10.0),
+    ("inches taken for millimetres", 0.0254 / 0.001),
+    ("feet taken for centimetres", 0.3048 / 0.01),
+)
+"""The same if the readings are too small then. Where they were divided by 100 their size tells it."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +84,8 @@ class UnitByOdometryOptions:
     0.1 in another unit. A larger value decides for fewer logs."""
     max_opposed: float = 0.2
     """Share of the pairs that the right unit contradicts, at most. A smaller value decides for fewer logs."""
-    typical_median: float = 3.0
-    """Median range that is expected, m."""
-    typical_speed: float = 0.5
-    """Speed of a robot that is expected, m/s."""
+    expected: ExpectedSizes = field(default_factory=ExpectedSizes)
+    """What tells whether the ranges or odometry are in another unit."""
     beside: float = 1.25
     """The right unit explains pairs better than one that is larger or smaller by this factor: odometry may be
     wrong by a factor that is near to that of a unit. A smaller value decides for fewer logs."""
@@ -154,18 +159,11 @@ def unit_by_odometry(
     told = []
     for name, scale in units:
         # Or odometry is in another unit, and the ranges are in metres.
-        as_ranges = abs(math.log(median * scale / options.typical_median)) + _off(speed, options)
-        as_odometry = abs(math.log(median / options.typical_median)) + _off(speed / scale, options)
-        if as_odometry - as_ranges > math.log(options.min_factor):
+        if ranges_over_odometry(median, speed, scale, options.expected) > options.min_factor:
             found = _explained(scans, steps.scaled(1.0 / scale), median, options)
             if found is not None:
                 told.append(UnitByOdometry(name, scale, found))
     return max(told, key=lambda unit: unit.evidence.gain, default=None)
-
-
-def _off(speed: float, options: UnitByOdometryOptions) -> float:
-    """How far a speed is off the expected one, as a logarithm."""
-    return abs(math.log(speed / options.typical_speed))
 
 
 class _Steps(NamedTuple):

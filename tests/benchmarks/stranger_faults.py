@@ -128,6 +128,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges × 1.1 from half-way on", _from_half_way(1.1), JUMP_OF_RANGES),
     ("ranges × 1.05 from half-way on", _from_half_way(1.05), JUMP_OF_RANGES),
     ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
+    ("ranges × 0.5", lambda log: faults.ranges_scaled(log, 0.5, slice(None)), "ranges, and so the size"),
+    ("ranges × 25.4", lambda log: faults.ranges_scaled(log, 25.4, slice(None)), "millimetres taken for"),
     ("ranges rounded to 0.1 m", lambda log: faults.ranges_rounded(log, 0.1), "multiples of 0.1 m"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("readings reversed from half-way on",

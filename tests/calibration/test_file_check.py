@@ -81,6 +81,10 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         lambda log: in_centimetres(odometry_faults.scaled(log, 0.9)),
         r"if the ranges,.*--range-scale 0\.009",
     ),
+    "ranges too short": (
+        lambda log: faults.ranges_scaled(log, 0.25, slice(None)),
+        r"are likely too short.* so small, or robots so fast; try --range-scale (4\.\d+|4|3\.9\d), or --odom",
+    ),
     "another scale from half-way on": (
         lambda log: odometry_faults.scaled_in(log, 1 / 1.2, slice(len(log) // 2, None)),
         r"change their scale from scan \d+ to \d+: one metre .* is (1|0\.9\d+|1\.0\d) m by scans before and "
