@@ -30,6 +30,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.repeated_reading import without_repeated_readings
 from nscan_cli.logs.robot_parts import ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
+from nscan_cli.logs.rolled_readings import with_first_beam_first
 from nscan_cli.logs.rounded_ranges import rounding_of_ranges
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
@@ -111,6 +112,8 @@ def laser_log(
     if not options.as_recorded:
         seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
         written, changed = corrected_directions(seen, beams, -1 if options.flip else 1)
+        raw, rolled = with_first_beam_first(raw, written, limits)
+        changed += rolled
     directions, told = in_whole_revolutions(raw, written, limits, options)
     if not told:
         directions, told = checked_by_walls(raw, written, limits, options)

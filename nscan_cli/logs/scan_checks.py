@@ -25,6 +25,7 @@ from nscan_cli.logs.recordings.sweep_segments import SweepSegmentOptions
 from nscan_cli.logs.repeated_reading import RepeatedReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions
 from nscan_cli.logs.robot_path import RobotPathOptions
+from nscan_cli.logs.rolled_readings import RolledReadingOptions
 from nscan_cli.logs.rounded_ranges import RoundedRangeOptions
 from nscan_cli.logs.scan_order import ScanOrderOptions
 from nscan_cli.logs.shared_stamps import SharedStampOptions
@@ -86,6 +87,8 @@ class ScanCheckOptions:
     """Whether messages are segments of sweeps."""
     two_lasers: TwoLaserOptions = field(default_factory=TwoLaserOptions)
     """Whether a topic has the scans of two lasers."""
+    rolled_readings: RolledReadingOptions = field(default_factory=RolledReadingOptions)
+    """Whether readings begin in the middle of the scan."""
     robot_parts: RobotPartsOptions = field(default_factory=RobotPartsOptions)
     """Beams that see the robot itself."""
     floor_line: FloorLineOptions = field(default_factory=FloorLineOptions)
