@@ -170,9 +170,9 @@ def _of_view(
         return None
     if not explains_positions(evidence.fit_turned(turned), options):
         return None
-    return mount_findings.changed_direction(
-        turned, _place(log, evidence, turned.step, reading), log.mount, options
-    )
+    steps = [turned.step] if turned.end is None else [turned.step, turned.end]
+    places = [_place(log, evidence, step, reading) for step in steps]
+    return mount_findings.changed_direction(turned, places, log.mount, options)
 
 
 def _place(

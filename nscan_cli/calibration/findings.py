@@ -209,6 +209,14 @@ class PlaceOfChange(NamedTuple):
         one, other = (f" {options}" if options else "" for options in (before, behind))
         return f"map each part by itself: try --end {self.end:.2f}{one}, or --start {self.start:.2f}{other}"
 
+    def cures_of_stretch(self, last: PlaceOfChange, outside: str = "", inside: str = "") -> str:
+        """How to map what is before, in and behind a stretch from here to a later place."""
+        one, other = (f" {options}" if options else "" for options in (outside, inside))
+        return (
+            f"map each part by itself: try --end {self.end:.2f}{one}, or --start {self.start:.2f} "
+            f"--end {last.end:.2f}{other}, or --start {last.start:.2f}{one}"
+        )
+
 
 def changed_scale(change: ScaleChange, steps: int, place: PlaceOfChange, reading: ReadingOptions) -> Finding:
     """Odometry or the ranges count otherwise from a scan on."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,9 +18,9 @@ from nscan_cli.poses import Array, inverse, transform, wrap
 
 
 def changed_direction(
-    change: DirectionChange, place: PlaceOfChange, mount: Array, options: FileCheckOptions
+    change: DirectionChange, places: Sequence[PlaceOfChange], mount: Array, options: FileCheckOptions
 ) -> Finding:
-    """The laser, at `mount` (3,) by the file, looks elsewhere from a scan on."""
+    """The laser, at `mount` (3,) by the file, looks elsewhere from a place on, or between two of them."""
     turn = math.degrees(float(wrap(change.behind - change.before)))
     side = "left" if turn > 0 else "right"
     mounts = [
@@ -30,10 +31,20 @@ def changed_direction(
     ]
     is_opposite = abs(turn) > 180.0 - math.degrees(options.opposite_within)
     other = ", or odometry counts forward as backward in one of them" if is_opposite else ""
+    place = places[0]
+    where = f"behind a place from scan {place.before} to {place.behind} than before"
+    cures = place.cures(*mounts)
+    if len(places) > 1:
+        last = places[1]
+        where = (
+            f"from a place from scan {place.before} to {place.behind} on until one from {last.before} to "
+            f"{last.behind} than elsewhere"
+        )
+        cures = place.cures_of_stretch(last, *mounts)
     return Finding(
-        f"the laser looks {abs(turn):.0f}° further to the {side} behind a place from scan {place.before} to "
-        f"{place.behind} than before, in {counted(change.steps, 'step')}: it was turned, or its bearings are "
-        f"counted from elsewhere{other}; {place.cures(*mounts)}",
+        f"the laser looks {abs(turn):.0f}° further to the {side} {where}, in "
+        f"{counted(change.steps, 'step')}: it was turned, or its bearings are "
+        f"counted from elsewhere{other}; {cures}",
         is_of_view=True,
     )
 

@@ -121,6 +121,11 @@ class ViewChangeOptions:
     max_part_sigma: float = 0.03
     """Largest such standard deviation that counts, rad: headings drift no farther. A larger value warns
     less."""
+    min_left: float = 0.05
+    """A stretch in the middle is looked for if one change leaves so much of the directions unexplained, as a
+    share: their mean square, rad², in small. A larger value finds fewer stretches."""
+    max_left_of_stretch: float = 0.3
+    """Such a stretch leaves less than this share of that. A larger value finds more."""
     doubt_steps: int = 2
     """More steps are measured where so many steps before and behind show a change. A larger value takes less
     time, and misses what changes near the beginning or the end."""

@@ -150,7 +150,8 @@ class StepEvidence:
     def fit_turned(self, change: DirectionChange) -> MountFit | None:
         """The fit of a laser that looks where it does before a change."""
         laser, turn = self.laser.copy(), change.behind - change.before
-        laser[change.step :, :2] = transform(np.array([0.0, 0.0, turn]), laser[change.step :, :2])
+        behind = slice(change.step, change.end)
+        laser[behind, :2] = transform(np.array([0.0, 0.0, turn]), laser[behind, :2])
         return self._fit(laser, self.odometry)
 
     def fit_with_signs(self, signs: Array) -> MountFit | None:

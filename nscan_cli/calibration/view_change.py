@@ -39,6 +39,8 @@ class DirectionChange(NamedTuple):
     """Standard deviation of their difference."""
     steps: int
     """Number of steps with motion."""
+    end: int | None = None
+    """The first step from which on it looks as before again; None if it does not."""
 
     def exceeds(self, turn: float, sigmas: float) -> bool:
         """Whether the two differ by more than a turn, rad, and by more than so many standard deviations."""
@@ -92,11 +94,17 @@ def direction_change(
     split = _clearest_split(np.stack([np.cos(angles), np.sin(angles)], axis=1), least)
     if split is None:
         return None
-    before, behind = (_usual_direction(some) for some in (angles[:split], angles[split:]))
-    sides = wrap(angles[:split] - before), wrap(angles[split:] - behind)
+    until = _end_of_stretch(np.stack([np.cos(angles), np.sin(angles)], axis=1), split, least, options)
+    is_behind = np.arange(len(angles)) >= split
+    if until is not None:
+        split, end = until
+        is_behind = (np.arange(len(angles)) >= split) & (np.arange(len(angles)) < end)
+    before, behind = (_usual_direction(some) for some in (angles[~is_behind], angles[is_behind]))
+    sides = wrap(angles[~is_behind] - before), wrap(angles[is_behind] - behind)
     drift = options.part_weight * _sigma_of_parts(*sides, options.min_steps)
     sigma = max(sigma_of_change(*sides), min(drift, options.max_part_sigma))
-    return DirectionChange(int(told[split]), before, behind, sigma, len(told))
+    back = None if until is None else int(told[until[1]])
+    return DirectionChange(int(told[split]), before, behind, sigma, len(told), back)
 
 
 def _clearest_split(values: Array, least: int) -> int | None:
@@ -108,6 +116,33 @@ def _clearest_split(values: Array, least: int) -> int | None:
     before, behind = sums[places - 1], sums[-1] - sums[places - 1]
     gains = (before**2).sum(axis=1) / places + (behind**2).sum(axis=1) / (len(values) - places)
     return int(places[np.argmax(gains)])
+
+
+def _end_of_stretch(
+    values: Array, split: int, least: int, options: ViewChangeOptions
+) -> tuple[int, int] | None:
+    """The places between which directions (n, 2) differ from those before and behind, with so many in each
+    part; None if they are better explained by two parts with a place `split` between."""
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(values, axis=0)])
+    left = _left(sums[split], split) + _left(sums[-1] - sums[split], len(values) - split)
+    places = np.arange(least, len(values) - least + 1)
+    if left < options.min_left * len(values) or len(places) < 2:
+        return None
+    inside = sums[places] - sums[places, None]
+    counts = (places - places[:, None]).astype(np.float64)
+    counts[counts < least] = np.nan
+    lefts = _left(inside, counts) + _left(sums[-1] - inside, len(values) - counts)
+    if np.isnan(lefts).all():
+        return None
+    first, last = np.unravel_index(np.nanargmin(lefts), lefts.shape)
+    is_clear = lefts[first, last] < options.max_left_of_stretch * left
+    return (int(places[first]), int(places[last])) if is_clear else None
+
+
+def _left(sums: Array, counts: Array | int) -> Array:
+    """(…) what the mean of so many directions leaves unexplained of them; their sums are (…, 2)."""
+    found: Array = counts - (sums**2).sum(axis=-1) / counts
+    return found
 
 
 def _sigma_of_parts(before: Array, behind: Array, length: int) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,6 +37,14 @@ def _from_half_way(factor: float) -> Fault:
 def _turned_from_half_way(degrees: float) -> Fault:
     """The second half of the scans has its bearings counted from elsewhere."""
     return lambda log: faults.turned_in(log, np.radians(degrees), slice(len(log) // 2, None))
+
+
+def _turned_on_robot(log: LaserLog, turn: float) -> LaserLog:
+    """A laser that sees all around is turned (rad) in the middle third, and the file does not know."""
+    ranges, rows = log.ranges.copy(), _middle(log)
+    beams = round(turn / float(log.angle_increment[0]))
+    ranges[rows] = np.roll(ranges[rows], beams, axis=1)
+    return replace(log, ranges=ranges)
 
 
 def _middle(log: LaserLog) -> slice:
@@ -146,6 +155,9 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("looks 90° left in the middle third",
         lambda log: faults.turned_in(log, 0.5 * np.pi, _middle(log)), JUMP_OF_DIRECTIONS,
     ),
+    ("turned by 90° on the robot in the middle third",
+        lambda log: _turned_on_robot(log, 0.5 * np.pi), "looks 90° further .* than elsewhere",
+    ),
     ("beams twice as far apart from half-way on",
         lambda log: faults.beams_apart(log, 2.0, slice(len(log) // 2, None)), JUMP_OF_DIRECTIONS,
     ),
@@ -161,7 +173,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("beams wider by 1 %", lambda log: faults.beams_apart(log, 1.01), "as if it were one turn"),
     ("halves of the scans exchanged",
-        lambda log: faults.rolled(log, log.ranges.shape[1] // 2),
+        lambda log: replace(log, ranges=np.roll(log.ranges, log.ranges.shape[1] // 2, axis=1)),
         "begin in the middle of the scan|looks 180",
     ),
     ("beams wider by one in 360",

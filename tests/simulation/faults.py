@@ -158,11 +158,6 @@ def turned_in(log: LaserLog, turn: float, rows: Rows) -> LaserLog:
     return replace(log, angle_min=first)
 
 
-def rolled(log: LaserLog, beams: int) -> LaserLog:
-    """The readings come so many beams later, and the last ones first."""
-    return replace(log, ranges=np.roll(log.ranges, beams, axis=1))
-
-
 def first_directions_jitter(log: LaserLog, sigma: float, seed: int = 1) -> LaserLog:
     """The file has first directions that are off by chance, with this standard deviation (rad)."""
     jitter = sigma * np.random.default_rng(seed).standard_normal(len(log))
