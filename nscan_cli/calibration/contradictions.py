@@ -238,7 +238,9 @@ def _of_opposite_turns(
     if is_nearer(fit, other, mount, options.mount_sigmas) or is_nearer_in_direction(
         fit, other, mount, options
     ):
-        return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options, False)]
+        of_odometry = replace(fit, mount=fit.mount * MIRRORED)
+        told = _of_positions(mount, of_odometry, evidence, reading, options, False)
+        return [findings.mirrored_odometry(turns, other), *map(findings.of_mirrored_scans, told)]
     is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or is_nearer_in_direction(
         fit, mount, other, options
     )

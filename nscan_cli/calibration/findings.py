@@ -16,7 +16,7 @@ from nscan_cli.calibration.step_evidence import StepEvidence
 from nscan_cli.calibration.view_change import TurnChange
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array
+from nscan_cli.poses import MIRRORED, Array
 
 UNDONE = "--as-recorded uses it as it is"
 AGREES = "; meanwhile odometry is changed to agree with the scans"
@@ -135,6 +135,23 @@ def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool, is_
         f"{cure}{other}",
         is_mirror_image=is_mended,
     )
+
+
+def mirrored_odometry(turns: TurnFit, mount: Array) -> Finding:
+    """Odometry turns the other way than the scans, and the laser, which mirrored scans show at `mount` (3,),
+    tells that the scans are right."""
+    return Finding(
+        f"odometry turns the wrong way: {turns_of(turns)}, and the laser is on the side that the file says; "
+        f"odometry is mirrored, so that it agrees with the scans; {UNDONE}",
+        seen_mount=mount,
+        is_mirror_image=True,
+    )
+
+
+def of_mirrored_scans(finding: Finding) -> Finding:
+    """A finding of scans as they are, with the mounting that mirrored ones show."""
+    seen = finding.seen_mount
+    return finding if seen is None else replace(finding, seen_mount=seen * MIRRORED)
 
 
 def turns_of(turns: TurnFit) -> str:

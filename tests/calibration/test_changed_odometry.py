@@ -49,7 +49,7 @@ def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wron
     log = aside(drive())
     assert log.odometry is not None
     (turning,) = found(replace(log, odometry=log.odometry * (1.0, -1.0, -1.0)))
-    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
+    assert re.search("odometry turns the wrong way: .*; odometry is mirrored, so", turning)
 
 
 def turned(log: LaserLog) -> LaserLog:
@@ -62,7 +62,23 @@ def test_a_laser_that_looks_aside_tells_them_as_well():
     (mirrored,) = found(faults.mirrored(turned(central(drive()))))
     assert re.search("in the wrong order, and the map is mirrored: .*; try --flip$", mirrored)
     (turning,) = found(odometry_faults.turning(turned(central(drive())), -1.0))
-    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
+    assert re.search("odometry turns the wrong way: .*; odometry is mirrored, so", turning)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0])
+def test_odometry_that_turns_the_wrong_way_is_mirrored_also_with_a_wrong_mounting(degrees: float):
+    log = aside(drive())
+    assert log.odometry is not None
+    file = replace(log, mount=log.mount + np.array([0.0, 0.0, np.radians(degrees)]))
+    opposite = replace(file, odometry=log.odometry * MIRRORED)
+    checked = checked_file(opposite, ReadingOptions(), FileCheckOptions())
+    assert checked.log.odometry is not None
+    # The laser moves as without any fault.
+    right = log.laser_pose(log.odometry)
+    moved = checked.log.laser_pose(checked.log.odometry)
+    np.testing.assert_allclose(relative(moved, moved[0]), relative(right, right[0]), atol=0.2)
+    if degrees:
+        assert "laser likely looks 30° further to the right" in checked.messages[1]
 
 
 @pytest.mark.parametrize("make", [faults.mirrored, lambda log: odometry_faults.turning(log, -1.0)])
