@@ -17,10 +17,10 @@ from nscan_cli.logs.scan_checks import SCAN_CHECKS
 from nscan_cli.slam.backend.guessed_steps import guessed_steps
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.mapped_drive import map_drive
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import LoopProgress
 from nscan_cli.slam.state import SlamState
-from nscan_cli.slam.systematic_error import map_drive
 
 MappingProgress = Callable[[int, int, int], None]
 """Called with the scans done, the keyframes, and the loops that are accepted so far."""

@@ -58,6 +58,37 @@ class SystematicErrorOptions:
     """Largest number of times that a drive is mapped again. A larger number takes longer."""
 
 
+@dataclass(frozen=True)
+class BridgedGapOptions:
+    """When a drive is mapped again with the way over a gap of its odometry that both sides tell."""
+
+    sigma: float = 0.04
+    """Standard deviation beyond which a scan does not tell how far the robot went, m. A larger value takes
+    more of the way from the scans."""
+    least_speed: float = 0.05
+    """A slower robot stands, m/s. A larger value makes its usual speed that of fast drives."""
+    min_ahead: float = 0.8
+    """Least length of the mean direction of its steps. A larger value leaves out robots that also drive
+    backward or sideways."""
+    slowest: float = 0.3
+    """Least speed where scans do not tell it, as a share of its usual one. A larger share bridges fewer
+    gaps."""
+    fastest: float = 1.5
+    """Greatest speed there, as a multiple of its usual one. A larger multiple bridges more gaps."""
+    max_turn: float = 0.35
+    """Most that odometry may turn otherwise than the map over a gap, rad. A larger value bridges more."""
+    max_apart: float = 0.2
+    """Both sides meet if they are no farther apart than this, m. A larger value bridges more gaps."""
+    max_apart_share: float = 0.1
+    """And this share of the way over the gap. A larger share bridges more gaps."""
+    least_gain: float = 0.2
+    """In the map the end of the gap is off by more than this, m. A larger value leaves more maps as they
+    are."""
+    gain_for_apart: float = 2.0
+    """And more by this multiple of how far both sides are apart. A larger multiple leaves more maps as they
+    are."""
+
+
 Relations = Literal["pairwise", "nscan", "both"]
 """What the graph is made of; see SlamOptions."""
 
@@ -94,6 +125,8 @@ class SlamOptions:
     """Step 6: which matches are made again from the final poses."""
     degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
     """How certain the length of a way is that no scan tells."""
+    odometry_gaps: BridgedGapOptions = field(default_factory=BridgedGapOptions)
+    """When the drive is mapped again with the way over gaps of its odometry."""
     systematic_error: SystematicErrorOptions = field(default_factory=SystematicErrorOptions)
     """When a drive is mapped again without a systematic error of its odometry."""
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)

@@ -1,4 +1,4 @@
-"""The systematic error of odometry, by the map of a whole drive, and the drive mapped again without it.
+"""The systematic error of odometry, by the map of a whole drive.
 
 Wheels of another size than the file says make all ways too long or too short, and wheels of different sizes
 bend them. Tracking learns this where scans tell their place (frontend/odometry_bias.py). Along bare corridors
@@ -8,20 +8,16 @@ off odometry by about the same, and a map without that is off by less.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from nscan_cli.calibration.changed_odometry import with_changed_odometry
-from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known, relative, wrap
-from nscan_cli.slam.options import SlamOptions, SystematicErrorOptions
-from nscan_cli.slam.pipeline import LoopProgress, run_slam
-from nscan_cli.slam.state import SlamState
+from nscan_cli.slam.options import SystematicErrorOptions
 
 
 class SystematicError(NamedTuple):
@@ -35,41 +31,6 @@ class SystematicError(NamedTuple):
     def and_then(self, more: SystematicError) -> SystematicError:
         """This one, and another one of the odometry without it."""
         return SystematicError(self.length * more.length, self.turn + more.turn * self.length)
-
-
-@dataclass(frozen=True)
-class MappedDrive:
-    """What `map_drive` returns."""
-
-    state: SlamState
-    graph: Graph
-    messages: list[str]
-    """What was put right."""
-
-
-def map_drive(
-    log: LaserLog,
-    options: SlamOptions,
-    threads: int = 1,
-    progress: Callable[[SlamState], LoopProgress] = lambda _state: lambda *_counts: None,
-    reading: ReadingOptions = ReadingOptions(),
-) -> MappedDrive:
-    """Run the loop, and again as long as its map shows a systematic error of the odometry.
-
-    `progress` makes what each run reports to. The log was read with `reading`; as recorded, its odometry is
-    believed.
-    """
-    limits, total, least = options.systematic_error, None, options.systematic_error.min_length
-    runs_left = 0 if reading.as_recorded else limits.max_runs
-    while True:
-        state = SlamState.of_log(log, options, threads)
-        graph = run_slam(state, progress(state))
-        found = systematic_error(graph.poses, log.odometry, state.breaks, limits, least)
-        if found is None or not runs_left:
-            return MappedDrive(state, graph, [] if total is None else [_message(total, reading)])
-        runs_left, least = runs_left - 1, limits.min_more_length
-        log = without_systematic_error(log, found)
-        total = found if total is None else total.and_then(found)
 
 
 def systematic_error(
@@ -151,7 +112,8 @@ def _corrected(poses: Array, error: SystematicError) -> Array:
     return corrected
 
 
-def _message(error: SystematicError, reading: ReadingOptions) -> str:
+def systematic_error_said(error: SystematicError, reading: ReadingOptions) -> str:
+    """What is said of odometry that is used without its error."""
     longer, veer = 1.0 / error.length - 1.0, np.degrees(error.turn)
     turns = f" and turns {abs(veer):.1f}° a metre too far {'right' if veer > 0 else 'left'}"
     return (

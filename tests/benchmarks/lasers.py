@@ -22,8 +22,8 @@ from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.mapped_drive import map_drive
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.systematic_error import map_drive
 from tests.benchmarks.robustness import false_loops
 from tests.experiments.output import table
 from tests.simulation.building import building, drive

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import wrap
+from nscan_cli.slam.mapped_drive import map_drive
 from nscan_cli.slam.options import SlamOptions, SystematicErrorOptions
 from nscan_cli.slam.systematic_error import (
     SystematicError,
-    map_drive,
     systematic_error,
     without_systematic_error,
 )
