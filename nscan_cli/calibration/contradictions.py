@@ -11,18 +11,15 @@ from nscan_cli.calibration.clock_offset import ClockOffset, clock_offset
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
-from nscan_cli.calibration.mount_fit import MountFit, TurnFit
+from nscan_cli.calibration.mount_fit import TurnFit
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.position_findings import of_opposite_turns, of_positions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
     are_of_one_size,
     explains_positions,
     is_change,
     is_excluded,
-    is_inverse,
-    is_nearer,
-    is_nearer_in_direction,
-    is_wrong_scale,
     never_changes,
     turns_agree,
 )
@@ -30,10 +27,7 @@ from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.unsteady_stamps import unsteady_delay
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import MIRRORED, Array, wrap
 
-BACKWARDS = np.array([-1.0, -1.0, 1.0])
-"""Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
 """Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
 
@@ -77,20 +71,20 @@ def find_contradictions(
     if changed is not None:
         return [changed]
     fit = evidence.fit
-    unusable = _unusable(evidence, turns, options)
+    unusable = _unusable(evidence, turns, reading, options)
     if unusable is not None:
         return [unusable]
     if turns is not None and _are_opposite(turns, evidence, options):
         mirrored = evidence.mirrored_fit
         if are_of_one_size(turns, options) and mirrored is not None and explains_positions(mirrored, options):
-            return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
-        return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
+            return of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
+        return [findings.wrong_turns(turns), *of_positions(log.mount, fit, evidence, reading, options)]
     found = []
     if turns is not None and not turns_agree(turns, options):
         never_turns = bool(is_still[2]) and turns.steps >= options.min_turns_unmeasured
         if never_turns or _are_told(turns, options):
             found.append(findings.wrong_turns(turns))
-    return found + _of_positions(log.mount, fit, evidence, reading, options)
+    return found + of_positions(log.mount, fit, evidence, reading, options)
 
 
 def changed_view(
@@ -122,14 +116,16 @@ def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOpti
     return turns.ratio < 0.0 and (_are_told(turns, options) or is_most)
 
 
-def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckOptions) -> Finding | None:
+def _unusable(
+    evidence: StepEvidence, turns: TurnFit | None, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding | None:
     """Why odometry cannot be used at all; None if it can."""
     is_explained = explains_positions(evidence.fit, options) or explains_positions(
         evidence.mirrored_fit, options
     )
     if not is_explained and explains_positions(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
         is_heading = turns is not None and turns.ratio < 0.0
-        return findings.wrong_signs(evidence, "headings" if is_heading else "x or y")
+        return findings.wrong_signs(evidence, "headings" if is_heading else "x or y", reading)
     excluded = is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options)
     if excluded and not evidence.is_explained_without_place:
         return findings.unexplained_positions(evidence)
@@ -218,74 +214,3 @@ def _is_offset(found: ClockOffset, gain: float, options: FileCheckOptions) -> bo
     is_better = found.disagreement < gain * min(found.as_stamped, found.elsewhere)
     is_better &= found.disagreement <= options.clock.max_left
     return is_better and abs(found.offset) >= options.clock.min_offset
-
-
-def _of_opposite_turns(
-    mount: Array,
-    turns: TurnFit,
-    fit: MountFit,
-    evidence: StepEvidence,
-    reading: ReadingOptions,
-    options: FileCheckOptions,
-) -> list[Finding]:
-    """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
-
-    The two are mirror images, except for the mounting: if the laser is beside the middle of the robot, or
-    looks aside, its side in the file is right in only one of the two cases. Small steps aside, which may be
-    of either sign, would pass for a place farther ahead or behind.
-    """
-    other = mount * MIRRORED
-    if is_nearer(fit, other, mount, options.mount_sigmas) or is_nearer_in_direction(
-        fit, other, mount, options
-    ):
-        of_odometry = replace(fit, mount=fit.mount * MIRRORED)
-        told = _of_positions(mount, of_odometry, evidence, reading, options, False)
-        return [findings.mirrored_odometry(turns, other), *map(findings.of_mirrored_scans, told)]
-    is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or is_nearer_in_direction(
-        fit, mount, other, options
-    )
-    mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain, True)
-    return [mirrored, *_of_positions(mount, fit, evidence, reading, options, False)]
-
-
-def _of_positions(
-    mount: Array,
-    fit: MountFit | None,
-    evidence: StepEvidence,
-    reading: ReadingOptions,
-    options: FileCheckOptions,
-    tell_place: bool = True,
-) -> list[Finding]:
-    """What the positions by odometry say of its scale and of the mounting, which the file has at (3,).
-
-    Where they do not `tell_place`, only of its direction.
-    """
-    if fit is None or not explains_positions(fit, options):
-        return []
-    found = []
-    if is_wrong_scale(fit, options):
-        found.append(findings.wrong_scale(fit, evidence.are_ranges_likelier(fit.scale), reading, options))
-    if tell_place and evidence.turning_both >= options.min_steps and is_inverse(fit, mount, options):
-        return [*found, mount_findings.inverse_mounting(mount, fit)]
-    if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
-        return [*found, _opposite(mount, fit, evidence, reading, options)]
-    mounting = mount_findings.wrong_mounting(mount, fit, evidence.turning_both, options, tell_place)
-    return found if mounting is None else [*found, mounting]
-
-
-def _opposite(
-    mount: Array, fit: MountFit, evidence: StepEvidence, reading: ReadingOptions, options: FileCheckOptions
-) -> Finding:
-    """A laser that looks back, or odometry that counts forward as backward.
-
-    The place of the laser decides, if it is ahead of the robot's middle or behind it. Otherwise the robot is
-    assumed to drive mostly forward.
-    """
-    sigmas, forward = options.mount_sigmas, evidence.forward_share
-    is_backward = is_nearer(fit, mount * BACKWARDS, mount, sigmas)
-    if is_backward or is_nearer(fit, mount, mount * BACKWARDS, sigmas):
-        why = "the laser is where the file says"
-    else:
-        is_backward = forward < 0.5
-        why = f"{forward:.0%} of the steps by odometry go forward"
-    return mount_findings.opposite_directions(mount, fit, why, is_backward, reading, options)

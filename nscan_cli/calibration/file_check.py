@@ -56,7 +56,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         compared = compare_ranges(log, options)
     log, jumps = checked_ranges(log, compared, options)
     known: KnownSteps = {}
-    log, headings = checked_headings(log, options, known)
+    log, headings = checked_headings(log, reading, options, known)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)

@@ -91,11 +91,21 @@ def unsteady_stamps(found: TurnDelay, steps: int, reading: ReadingOptions, optio
     return replace(_unused(message, cure), is_of_clocks=True)
 
 
-def wrong_signs(evidence: StepEvidence, what: str) -> Finding:
+def wrong_signs(evidence: StepEvidence, what: str, reading: ReadingOptions) -> Finding:
     """With the sign of `what` changed the odometry agrees."""
     return _unused(
         f"odometry counts {what} the wrong way: with the other sign its positions agree with the "
-        f"scans, in {counted(evidence.moving, 'step')}"
+        f"scans, in {counted(evidence.moving, 'step')}",
+        mirrored_instead(reading),
+    )
+
+
+def mirrored_instead(reading: ReadingOptions) -> str:
+    """What to do if a mended sign of odometry has hidden readings in the wrong order: with another sign of
+    odometry these look the same."""
+    cure = "leave out --flip" if reading.flip else "try --flip"
+    return (
+        f"; if left and right are exchanged in the map, the readings are in the wrong order as well: {cure}"
     )
 
 
@@ -144,6 +154,29 @@ def mirrored_odometry(turns: TurnFit, mount: Array) -> Finding:
         f"odometry turns the wrong way: {turns_of(turns)}, and the laser is on the side that the file says; "
         f"odometry is mirrored, so that it agrees with the scans; {UNDONE}",
         seen_mount=mount,
+        is_mirror_image=True,
+    )
+
+
+def reversed_odometry(turns: TurnFit, seen: Array, reading: ReadingOptions, is_certain: bool) -> Finding:
+    """Wheels that both count backward: odometry drives and turns the other way than the scans.
+
+    `seen` (3,) is the mounting that mirrored scans show. `is_certain`: the mounting excludes that the
+    readings are in the wrong order and odometry drives the other way.
+    """
+    flip, scale = "leaving out --flip, and" if reading.flip else "--flip", -reading.odometry_scale
+    other = (
+        ""
+        if is_certain
+        else (
+            "; if left and right are exchanged in the map, the readings are in the wrong order instead, and "
+            f"odometry counts forward as backward: try {flip} --odometry-scale {scale:g}"
+        )
+    )
+    return Finding(
+        f"odometry likely counts both wheels backward: {turns_of(turns)}, and it drives backward where "
+        f"they go forward; it is reversed, so that it agrees with the scans; {UNDONE}{other}",
+        seen_mount=seen,
         is_mirror_image=True,
     )
 

@@ -11,12 +11,14 @@ import numpy as np
 
 from nscan_cli.calibration.changed_odometry import with_changed_odometry
 from nscan_cli.calibration.driving_direction import driving_direction
+from nscan_cli.calibration.findings import UNDONE, mirrored_instead
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
 from nscan_cli.calibration.odometry_fault_options import ReversedHeadingOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known
 
 HEADINGS_REVERSED = np.array([1.0, 1.0, -1.0])
@@ -24,7 +26,7 @@ HEADINGS_REVERSED = np.array([1.0, 1.0, -1.0])
 
 
 def checked_headings(
-    log: LaserLog, options: FileCheckOptions, known: KnownSteps
+    log: LaserLog, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
 ) -> tuple[LaserLog, list[str]]:
     """The log with the headings of its odometry reversed if its positions and its scans say so, and messages.
 
@@ -44,7 +46,7 @@ def checked_headings(
     some = f"{np.count_nonzero(opposite)} of {counted(len(opposite), 'turn')}"
     message = (
         "odometry counts headings the wrong way: with the other sign the robot drives the way that it heads, "
-        f"and turns as the scans do, in {some}; the sign is changed; --as-recorded uses it as it is"
+        f"and turns as the scans do, in {some}; the sign is changed; {UNDONE}{mirrored_instead(reading)}"
     )
     return with_changed_odometry(log, lambda poses, _times: poses * HEADINGS_REVERSED), [message]
 

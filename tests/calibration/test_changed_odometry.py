@@ -65,6 +65,36 @@ def test_a_laser_that_looks_aside_tells_them_as_well():
     assert re.search("odometry turns the wrong way: .*; odometry is mirrored, so", turning)
 
 
+@pytest.mark.parametrize("make", [drive, lambda: aside(drive()), lambda: central(drive())])
+def test_odometry_that_drives_and_turns_backward_is_reversed(make):
+    log = make()
+    assert log.odometry is not None
+    checked = checked_file(odometry_faults.backward(log), ReadingOptions(), FileCheckOptions())
+    (said,) = checked.messages
+    assert "odometry likely counts both wheels backward" in said
+    # A laser aside tells it from mirrored readings.
+    assert said.endswith("uses it as it is" if log.mount[1] > 0.1 else "try --flip --odometry-scale -1")
+    assert checked.log.odometry is not None
+    moved, right = checked.log.laser_pose(checked.log.odometry), log.laser_pose(log.odometry)
+    np.testing.assert_allclose(relative(moved, moved[0]), relative(right, right[0]), atol=1e-9)
+
+
+def test_both_of_mirrored_readings_and_backward_odometry_are_named_where_the_laser_is_aside():
+    log = odometry_faults.scaled(faults.mirrored(aside(drive())), -1.0)
+    order, direction = found(log)
+    assert order.endswith("try --flip")
+    assert "try --odometry-scale -1, or" in direction
+
+
+def test_a_sign_of_odometry_may_hide_readings_in_the_wrong_order():
+    """Of two signs of one, and of mirrored readings with the other one, the scans are the same."""
+    log = drive()
+    assert log.odometry is not None
+    for signs in ((1.0, -1.0, 1.0), (1.0, 1.0, -1.0)):
+        (said,) = found(replace(log, odometry=log.odometry * signs))
+        assert said.endswith("in the wrong order as well: try --flip")
+
+
 @pytest.mark.parametrize("degrees", [0.0, 30.0])
 def test_odometry_that_turns_the_wrong_way_is_mirrored_also_with_a_wrong_mounting(degrees: float):
     log = aside(drive())

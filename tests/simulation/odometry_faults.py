@@ -77,6 +77,11 @@ def behind(log: LaserLog) -> LaserLog:
     return replace(log, odometry=_summed(_odometry(log)[0], steps))
 
 
+def backward(log: LaserLog) -> LaserLog:
+    """Both wheels count backward: the odometry drives and turns the other way."""
+    return replace(log, odometry=_odometry(log) * (-1.0, 1.0, -1.0), odometry_path=None)
+
+
 def unsigned(log: LaserLog) -> LaserLog:
     """It counts reversing as driving forward; its turns are right."""
     steps = relative(_odometry(log)[1:], _odometry(log)[:-1])
