@@ -76,19 +76,24 @@ def order_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptio
 
 
 def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
-    """Whether scans before a row match the mirror images of those behind, and those of one side do not."""
+    """Whether scans before a row match the mirror images of those behind, and those of one side do not.
+
+    As read after any turn they match no better: the laser may have been turned on the robot.
+    """
     gain, across = options.order.min_gain, []
     for rows in pairs_across(row):
         matched = _matched_both_ways(log, *rows, options)
         if matched is None or _gain(matched) <= gain:
             return False
-        across.append(matched.mirrored.pose)
+        across.append(matched)
     sides = []
     for first in (row - 2, row):
         matched = _matched_both_ways(log, first, first + 1, options)
         if matched is None or _gain(matched) >= -gain:
             return False
         sides.append(matched.as_read.pose)
+    if _match_after_turns(log, row, across, options):
+        return False
     if log.odometry is not None:
         return True
     # Nothing tells how far the robot turned from one scan to the next: as read they may match after a turn.
@@ -97,9 +102,25 @@ def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
     turned = (_matched_both_ways(log, *rows, options, turns.tolist()) for rows in pairs_across(row))
     # Two scans of a long room from before and after a turn may fit the mirror image better.
     before, behind = sides[0], sides[1] * MIRRORED
-    return lead_one_way(across, (before, behind), order.max_misfit, order.max_turn_misfit) and all(
-        matched is not None and _gain(matched) > gain for matched in turned
-    )
+    return lead_one_way(
+        [matched.mirrored.pose for matched in across],
+        (before, behind),
+        order.max_misfit,
+        order.max_turn_misfit,
+    ) and all(matched is not None and _gain(matched) > gain for matched in turned)
+
+
+def _match_after_turns(
+    log: LaserLog, row: int, across: Sequence[_Matched], options: FileCheckOptions
+) -> bool:
+    """Whether pairs across a row match better as read, after some turn, than with the later one mirrored."""
+    turns = np.arange(-np.pi, np.pi, options.order.turn_step).tolist()
+    gain = 0.0
+    for mirrored, rows in zip(across, pairs_across(row), strict=True):
+        turned = _matched_both_ways(log, *rows, options, turns)
+        if turned is not None:
+            gain += (mirrored.mirrored.energy - turned.as_read.energy) / turned.points
+    return gain > options.order.min_gain * len(across)
 
 
 class _Matched(NamedTuple):

@@ -70,7 +70,8 @@ class OrderJumpOptions:
     """Without odometry, scans are also matched after turns of the robot up to this angle, rad. With a larger
     one scans of faster turns keep their order."""
     turn_step: float = 0.4
-    """Interval between these turns, rad. A smaller one takes longer."""
+    """Interval between these turns, rad, and between those all around after which a laser that was turned on
+    the robot would match. A smaller one takes longer."""
     max_misfit: float = 0.8
     """Without odometry, the steps by these pairs agree to so many metres. A larger value finds more."""
     max_turn_misfit: float = 0.2

@@ -16,9 +16,12 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.data import data_file
 from tests.simulation import faults, odometry_faults
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import office
 from tests.slam.keyframe_drives import round_scene
 
 OPTIONS = FileCheckOptions()
+ROUND = Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0, mount=(0.2, 0.0, 0.0))
 
 
 @functools.cache
@@ -59,6 +62,14 @@ def test_there_and_back_again():
     at = len(log) // 3
     _, said = checked(faults.mirrored_in(log, slice(at, 2 * at)))
     assert said[0].startswith(f"the readings of scans {at} to {2 * at - 1} come in the other order")
+
+
+def test_a_laser_that_is_turned_round_on_the_robot_is_no_change_of_the_order():
+    """In a corridor half a turn and a mirror image look alike."""
+    scene = office()
+    log = scene.record_at(scene.truth()[250:850], 11, ROUND).log()
+    assert jumps_of(faults.turned_in(log, np.pi, slice(200, 400))) == []
+    assert jumps_of(faults.mirrored_in(log, slice(200, 400))) == [200, 400]
 
 
 def test_what_is_wrong_all_along_or_with_odometry_is_no_change():
