@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import evenly
 from nscan_cli.poses import Array
@@ -20,7 +21,7 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class RangeOffsetOptions:
-    """When a length is taken from all ranges, or added."""
+    """When a length is taken from all ranges, or added, or named."""
 
     half_widths: tuple[float, ...] = (0.4, 0.6)
     """Walls are looked for within these angles on both sides of a beam, rad. Wider ones tell the length more
@@ -64,6 +65,11 @@ class RangeOffsetOptions:
     by lasers that measure too long. A larger value changes fewer logs."""
     min_quartile: float = 0.03
     """Three quarters of them tell at least this length, m. A larger value changes fewer logs."""
+    likely_offset: float = 0.06
+    """From this length on that half of the walls tell, m, it is named. A larger value names it for fewer
+    logs."""
+    likely_quartile: float = 0.02
+    """And from this one on that three quarters of them tell, m. A larger value names it for fewer logs."""
     bandwidth: float = 0.025
     """Width of the kernel with which the length that most walls tell is found, m."""
 
@@ -89,17 +95,19 @@ class WallOffsets(NamedTuple):
         shares = np.cumsum(self.weights)
         return float(self.offsets[np.searchsorted(shares, share * shares[-1])])
 
-    def tell(self, options: RangeOffsetOptions) -> float:
-        """The sign of the length that ranges are off by beyond doubt; 0 for none."""
+    def tell(self, least: float, least_quartile: float) -> bool:
+        """Whether half of the walls tell this length of one sign, m, and three quarters the second one."""
         middle = self.quantile(0.5)
         sign = math.copysign(1.0, middle)
         outer = self.quantile(0.25 if middle > 0.0 else 0.75)
-        is_told = sign * middle >= options.min_offset and sign * outer >= options.min_quartile
-        return sign if is_told else 0.0
+        return sign * middle >= least and sign * outer >= least_quartile
 
-    def is_of_ranges(self, options: RangeOffsetOptions) -> bool:
+    def is_of_ranges(self, clearly: float, options: RangeOffsetOptions) -> bool:
         """Whether near walls tell as much as far ones do. A wrong angle between beams bends walls, too, as if
-        ranges were too long by a share of themselves."""
+        ranges were too long by a share of themselves.
+
+        `clearly` is how far what they tell is from that of a wrong angle: 0 there, 1 for a length.
+        """
         is_near = self.distances < np.median(self.distances)
         near, far = (
             WallOffsets(self.offsets[some], self.weights[some], self.distances[some])
@@ -111,7 +119,7 @@ class WallOffsets(NamedTuple):
             return True
         nearness = float(np.median(near.distances) / np.median(far.distances))
         share = near.quantile(0.5) / far.quantile(0.5)
-        return nearness < options.max_nearness and share > 0.5 * (1.0 + nearness)
+        return nearness < options.max_nearness and share > nearness + clearly * (1.0 - nearness)
 
     def most_told(self, options: RangeOffsetOptions) -> float:
         """The length that most of the weight is about."""
@@ -136,22 +144,38 @@ def checked_offset(
         found = _wall_offsets(ranges, steps, more, options)
     if len(found.offsets) < options.min_walls:
         return 0.0, []
-    sign = found.tell(options)
-    if (
-        not sign
-        or not found.is_of_ranges(options)
-        or any(
-            sign * part.quantile(0.5) < 0.5 * options.min_offset for part in _of_parts(ranges, steps, options)
-        )
-    ):
+    if not found.tell(options.likely_offset, options.likely_quartile):
         return 0.0, []
+    is_all_around = _sees_all_around(ranges, steps)
+    if not is_all_around and not found.is_of_ranges(0.0, options):
+        return 0.0, []
+    sign = math.copysign(1.0, found.quantile(0.5))
+    least = min((sign * part.quantile(0.5) for part in _of_parts(ranges, steps, options)), default=np.inf)
+    if least < 0.5 * options.likely_offset:
+        return 0.0, []
+    is_certain = found.tell(options.min_offset, options.min_quartile) and least >= 0.5 * options.min_offset
+    is_certain &= is_all_around or found.is_of_ranges(0.5, options)
     offset = round(found.most_told(options), 2)
-    what = "long" if offset > 0.0 else "short"
+    what = f"{abs(offset):.2f} m too {'long' if offset > 0.0 else 'short'}"
+    walls = counted(len(found.offsets), "wall")
+    if not is_certain:
+        return 0.0, [
+            f"the ranges are likely {what}: with that {walls} are bent; try --range-offset {-offset:.2f}; if "
+            "the map is worse then, the angle between beams is wrong instead (--angle-increment)"
+        ]
     return -offset, [
-        f"the ranges are {abs(offset):.2f} m too {what}: without that {len(found.offsets):,} walls are "
-        f"straight, with it they are bent; {-offset:+.2f} m is added, as by --range-offset {-offset:.2f}; "
-        "--as-recorded uses the ranges as they are"
+        f"the ranges are {what}: without that {walls} are straight, with it they are bent; {-offset:+.2f} m "
+        f"is added, as by --range-offset {-offset:.2f}; --as-recorded uses the ranges as they are"
     ]
+
+
+def _sees_all_around(ranges: NDArray[np.float32], steps: Array) -> bool:
+    """Whether the beams of scans (S, B), `steps` (S,) rad apart, are a whole turn.
+
+    Then the angle between them is not wrong by a little.
+    """
+    step = abs(float(np.median(steps)))
+    return bool(abs(ranges.shape[1] * step - 2.0 * math.pi) < 1.5 * step)
 
 
 def _of_parts(ranges: NDArray[np.float32], steps: Array, options: RangeOffsetOptions) -> list[WallOffsets]:
