@@ -216,7 +216,7 @@ def _odometry(
         return None, recorded, []
     scale = options.odometry_scale
     if recorded is None:
-        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options)
+        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options, times.is_measured)
         return scaled_odometry(odometry, scale), None, said
     poses, said = _credible(recorded.poses, recorded.times, None, options)
     path = robot_path(recorded.times, scaled_odometry(poses, scale))
@@ -233,16 +233,17 @@ def _credible(
     times: Array,
     scans: tuple[NDArray[np.float32], Indices] | None,
     options: ReadingOptions,
+    is_measured: bool = True,
 ) -> tuple[Array, list[str]]:
     """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and messages.
 
-    `scans` are as `without_repeats` takes them.
+    `scans` are as `without_repeats` takes them, `is_measured` as `without_outliers` takes it.
     """
     if options.as_recorded:
         return odometry, []
     odometry, both = of_one_source(odometry, times)
     odometry, noise = without_jitter(odometry, times)
-    odometry, wrong = without_outliers(odometry, times)
+    odometry, wrong = without_outliers(odometry, times, is_measured=is_measured)
     odometry, slow = without_repeats(odometry, times, scans)
     return odometry, [text for text in (both, noise, wrong, slow) if text]
 

@@ -5,7 +5,7 @@ The poses before and behind agree with each other, and such a value is far from 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,12 +56,18 @@ class OdometryOutlierOptions:
 
 
 def without_outliers(
-    odometry: Array, times: Array, options: OdometryOutlierOptions = OdometryOutlierOptions()
+    odometry: Array,
+    times: Array,
+    options: OdometryOutlierOptions = OdometryOutlierOptions(),
+    is_measured: bool = True,
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, steady where single values are wrong; and what to say.
 
-    Unknown poses are nan and stay so. The text is empty where nothing is changed.
+    Unknown poses are nan and stay so. The text is empty where nothing is changed. If times are not measured
+    but made up, they are even where the robot's motion is not.
     """
+    if not is_measured:
+        options = replace(options, min_single=np.inf)
     known = np.flatnonzero(are_known(odometry))
     poses, at = odometry[known], times[known]
     stretches = _with_others(_excursions(poses, at, options), _singles(poses, at, options))

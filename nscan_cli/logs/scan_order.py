@@ -67,6 +67,13 @@ class ScanOrder:
     nominal: bool
     """Whether the stamps are unusable and the times made up"""
     warnings: list[str]
+    shared: bool = False
+    """Whether scans shared stamps, and their times are made up between these"""
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether each scan has its own time."""
+        return not self.nominal and not self.shared
 
 
 def scans_by_time(
@@ -143,7 +150,7 @@ def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -
         warnings.append(f"{counted(backward, 'step')} back in time; the scans are sorted by time")
     rows = np.argsort(times, kind="stable")
     texts = [f"{times[row]:.6f}" if is_new[row] else stamps[row] for row in rows]
-    return ScanOrder(rows, times[rows], texts, backward, False, warnings)
+    return ScanOrder(rows, times[rows], texts, backward, False, warnings, bool(is_moved.any()))
 
 
 def _set_back(times: Array, options: ScanOrderOptions) -> list[tuple[int, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions, without_outliers
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
+from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import data_file
 from tests.logs import lines
 from tests.logs.lines import flaser
@@ -66,6 +68,17 @@ def test_a_single_value_is_found_where_those_beside_it_lie_on_one_way(wrong):
     assert said.startswith("odometry has 3 single wrong values,")
     options = OdometryOutlierOptions(min_single=1.0)
     assert without_outliers(broken, times, options)[0] is broken
+
+
+@pytest.mark.parametrize("name", ["intel", "fr-clinic"])
+def test_times_that_are_made_up_tell_no_single_value(name: str, tmp_path: Path):
+    """The scans of intel come in bursts; spread evenly between whole seconds their motion is uneven."""
+    recorded = read_log(str(data_file(f"{name}.log.gz")))
+    for stamps in ([f"{int(time)}.0" for time in recorded.times], ["0"] * len(recorded)):
+        path = tmp_path / "seconds.log"
+        path.write_bytes(with_own_angles(replace(recorded, stamps=tuple(stamps))))
+        log = read_log(str(path))
+        assert not any(said.startswith(BEGINNING) for said in log.report.contradictions + log.report.warnings)
 
 
 def test_single_values_are_found_where_times_are_irregular():
