@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -91,8 +93,10 @@ def test_a_person_who_walks_about_a_standing_laser_breaks_no_track(every):
 )
 @pytest.mark.parametrize("odometry", [True, False])
 def test_a_robot_that_someone_carries_is_tracked_by_what_it_sees(name, first, last, way, odometry):
-    """Half of its beams end on whoever holds it. Odometry stands still, or is missing."""
-    run = mapped(read_log(str(data_file(f"field/urg-{name}.bag")), ReadingOptions(odometry=odometry)))
+    """Half of its beams end on whoever holds it. Odometry, whose clock is put right, stands, or is missing."""
+    reading = ReadingOptions(odometry=odometry)
+    log = read_log(str(data_file(f"field/urg-{name}.bag")), reading)
+    run = mapped(checked_file(log, reading, FileCheckOptions()).log)
     assert run.state.breaks == []
     carried_by = run.graph.poses[last] - run.graph.poses[first]
     assert np.hypot(*carried_by[:2]) == pytest.approx(way, abs=0.4)
