@@ -159,7 +159,9 @@ class LoopDetector:
         while len(near):
             first = int(near[np.argmin(away[near] - self.options.sigmas * sigma.distance[near])])
             window, around = self._visit(route, centre, first, sigma)
-            found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
+            found = None
+            if not lost[first] or len(around) >= self.options.min_lost_visit:
+                found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
             if isinstance(found, Loop):
                 self._refused.append(found)
             elif found is not None:

@@ -88,6 +88,9 @@ class LoopClosureOptions:
     compares with more of that visit."""
     min_score: float = 0.55
     """Least share of points that fit at a place. A larger share refuses more."""
+    min_lost_visit: int = 3
+    """Least number of keyframes in one piece of an earlier visit among which a keyframe is searched that may
+    be anywhere: a short piece tells no place, and there may be hundreds. A larger number searches less."""
     min_score_far: float = 0.45
     """Least share of points that fit where the path may be off by more than `min_distance`. It is smaller
     than `min_score`: only such a loop corrects the path there, and a laser that looks ahead sees half of what

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
+from nscan_cli.slam.loop_closure import loop_detector
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
@@ -162,13 +164,12 @@ def test_what_is_farther_off_than_the_path_drifts_must_be_seen_from_scans_far_ap
     assert {loop.reason for loop in waits.refused()} == {SO_FAR_OFF}
 
 
-def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
-    """A corridor, and then, carried there, once round an office and, carried again, 16 m of it once more.
+def carried(firsts: Sequence[int]) -> Driven:
+    """A corridor, and then, carried there, once round an office and 16 m of it once more.
 
-    The corridor is no less likely than the office, of which nobody knows how it lies to it.
+    The robot is carried before the keyframes of `firsts`.
     """
     doors, office, breaking = like_doors_drive(), round_drive(), BreakOptions()
-    firsts, size = (0, 9, 54), 9 + len(office.keyframes)
     keyframes, chain = [], []
     for k, keyframe in enumerate([*doors.keyframes[:9], *office.keyframes]):
         pieces = sum(k >= first for first in firsts)
@@ -176,20 +177,37 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
         tracked = dataclasses.replace(keyframe.tracked, path=path)
         keyframes.append(dataclasses.replace(keyframe, row=ROWS * k, tracked=tracked))
     nothing = np.diag(np.array([breaking.distance_sigma, breaking.distance_sigma, breaking.turn_sigma]) ** -2)
-    carried = Pairwise((0, 0), np.array([30.0, 5.0, 2.0]), nothing, "track")
-    for k, relation in enumerate([*doors.chain[:8], carried, *office.chain]):
-        known = carried if k + 1 in firsts else relation
+    step = Pairwise((0, 0), np.array([30.0, 5.0, 2.0]), nothing, "track")
+    for k, relation in enumerate([*doors.chain[:8], step, *office.chain]):
+        known = step if k + 1 in firsts else relation
         chain.append(dataclasses.replace(known, nodes=(ROWS * k, ROWS * (k + 1))))
-    drive = Driven(keyframes, chain, along(chain), office.truth)
-    lost = LoopDetector(LoopClosureOptions(), NSCAN, match_neighbours, EnergyCache(ROWS * size))
-    found = closed_along(lost, drive)
+    return Driven(keyframes, chain, along(chain), office.truth)
+
+
+def lost(drive: Driven, options: LoopClosureOptions = LoopClosureOptions()) -> LoopDetector:
+    return LoopDetector(options, NSCAN, match_neighbours, EnergyCache(ROWS * len(drive.keyframes)))
+
+
+def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
+    """The corridor is no less likely than the office, of which nobody knows how it lies to it."""
+    drive = carried((0, 9, 54))
+    found = closed_along(lost(drive), drive)
     assert found
     for _, places in found:
         assert len(places) >= 3
         for place in places:
-            assert 9 <= place.old < 54 <= place.centre < size
-            off = place.measured - relative(office.truth[place.centre - 9], office.truth[place.old - 9])
+            assert 9 <= place.old < 54 <= place.centre < len(drive.keyframes)
+            off = place.measured - relative(drive.truth[place.centre - 9], drive.truth[place.old - 9])
             assert np.abs(off[:2]).max() < 0.05
+
+
+@pytest.mark.parametrize(("least", "is_searched"), [(3, False), (2, True)])
+def test_who_is_lost_is_not_searched_for_in_pieces_of_two_keyframes(monkeypatch, least, is_searched):
+    """Each would take as long as a long one, and tells no place."""
+    drive, searched = carried(range(0, 56, 2)), []
+    monkeypatch.setattr(loop_detector, "find_place", lambda *_arguments: searched.append(True))
+    closed_along(lost(drive, LoopClosureOptions(min_lost_visit=least)), drive, until=55)
+    assert bool(searched) == is_searched
 
 
 # ----------------------------------------------------------------------------- where is searched
