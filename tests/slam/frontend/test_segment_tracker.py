@@ -93,7 +93,7 @@ def test_a_person_who_walks_about_a_standing_laser_breaks_no_track(every):
 )
 @pytest.mark.parametrize("odometry", [True, False])
 def test_a_robot_that_someone_carries_is_tracked_by_what_it_sees(name, first, last, way, odometry):
-    """Half of its beams end on whoever holds it. Odometry, whose clock is put right, stands, or is missing."""
+    """Half of its beams end on whoever holds it. Odometry, its clock put right, stands, or is missing."""
     reading = ReadingOptions(odometry=odometry)
     log = read_log(str(data_file(f"field/urg-{name}.bag")), reading)
     run = mapped(checked_file(log, reading, FileCheckOptions()).log)

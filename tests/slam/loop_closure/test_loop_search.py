@@ -84,7 +84,8 @@ def test_the_window_is_as_wide_as_the_graph_is_unsure(searches):
     windows = []
     for drift, drift_angle in ((0.05, 0.002), (0.4, 0.03), (9.0, 1.0)):
         del made[:]
-        closed_along(closing(LoopClosureOptions(drift=drift, drift_angle=drift_angle)), round_drive())
+        unsure = LoopClosureOptions(drift=drift, drift_angle=drift_angle, min_lost_visit=1)
+        closed_along(closing(unsure), round_drive())
         windows.append([(window.distance, window.turn) for _, _, window in made])
     assert set(windows[0]) == {(options.min_distance, options.min_turn)}
     # 3 · 0.4 m · √66 are 9.7 m, and the angles give some more; 3 · 0.03 · √66 are 0.73 rad.
