@@ -91,19 +91,19 @@ def direction_change(
     told: Indices = np.flatnonzero(moves & (np.hypot(*by_odometry[:, :2].T) >= options.min_length))
     driven, seen = (np.arctan2(steps[told, 1], steps[told, 0]) for steps in (by_odometry, laser))
     angles = driven - seen
-    split = _clearest_split(np.stack([np.cos(angles), np.sin(angles)], axis=1), least)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    split = _clearest_split(directions, least)
     if split is None:
         return None
-    until = _end_of_stretch(np.stack([np.cos(angles), np.sin(angles)], axis=1), split, least, options)
-    is_behind = np.arange(len(angles)) >= split
-    if until is not None:
-        split, end = until
-        is_behind = (np.arange(len(angles)) >= split) & (np.arange(len(angles)) < end)
+    stretch = _clearest_stretch(directions, split, least, options)
+    split, end = (split, len(angles)) if stretch is None else stretch
+    is_behind = np.zeros(len(angles), dtype=np.bool_)
+    is_behind[split:end] = True
     before, behind = (_usual_direction(some) for some in (angles[~is_behind], angles[is_behind]))
     sides = wrap(angles[~is_behind] - before), wrap(angles[is_behind] - behind)
     drift = options.part_weight * _sigma_of_parts(*sides, options.min_steps)
     sigma = max(sigma_of_change(*sides), min(drift, options.max_part_sigma))
-    back = None if until is None else int(told[until[1]])
+    back = None if stretch is None else int(told[end])
     return DirectionChange(int(told[split]), before, behind, sigma, len(told), back)
 
 
@@ -118,7 +118,7 @@ def _clearest_split(values: Array, least: int) -> int | None:
     return int(places[np.argmax(gains)])
 
 
-def _end_of_stretch(
+def _clearest_stretch(
     values: Array, split: int, least: int, options: ViewChangeOptions
 ) -> tuple[int, int] | None:
     """The places between which directions (n, 2) differ from those before and behind, with so many in each

@@ -21,6 +21,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, are_known, compose, relative, wrap
+from nscan_cli.slam.backend.degenerate_relations import usual_speed
 from nscan_cli.slam.options import BridgedGapOptions
 from nscan_cli.slam.state import SlamState
 
@@ -58,15 +59,15 @@ def bridged_gaps(state: SlamState, poses: Array) -> list[BridgedGap]:
     bridged, and none of a robot that also drives backward or sideways.
     """
     log, options = state.log, state.options.odometry_gaps
-    if log.odometry is None or are_known(log.odometry).all():
+    if log.odometry is None or (known := are_known(log.odometry)).all():
         return []
-    usual = _usual_speed(log, options)
+    usual = usual_speed(log.odometry, log.times, known, options.least_speed)
     ahead = driving_direction(log.odometry, options.least_speed * float(np.median(np.diff(log.times))), 1)
     if np.hypot(*ahead) < options.min_ahead:
         return []
     weak, found = np.concatenate(state.weakest_sigmas) > options.sigma, []
     broken = np.concatenate([state.breaks, state.odometry_jumps, state.odometry_stalls])
-    for first, end in mask_runs(~are_known(log.odometry)):
+    for first, end in mask_runs(~known):
         is_inside = first > 0 and end < len(log)
         if is_inside and not ((first <= broken) & (broken <= end)).any():
             rows = slice(first - 1, end + 1)
@@ -111,16 +112,6 @@ def _bridge(
     return way, path, float(np.hypot(*steps[is_weak].T).sum())
 
 
-def _usual_speed(log: LaserLog, options: BridgedGapOptions) -> float:
-    """The median speed (m/s) by odometry of a robot that drives; 0 if it never does."""
-    assert log.odometry is not None
-    lengths = np.hypot(*relative(log.odometry[1:], log.odometry[:-1])[:, :2].T)
-    periods = np.diff(log.times)
-    drives = lengths > np.maximum(options.least_speed * periods, 1e-9)
-    speeds = lengths[drives] / np.maximum(periods[drives], 1e-9)
-    return float(np.median(speeds)) if len(speeds) else 0.0
-
-
 def with_bridged_gaps(log: LaserLog, gaps: Sequence[BridgedGap]) -> LaserLog:
     """The log with odometry in these gaps. Behind each, odometry goes on from the way over it."""
     if log.odometry is None:
@@ -144,6 +135,8 @@ def with_bridged_gaps(log: LaserLog, gaps: Sequence[BridgedGap]) -> LaserLog:
 
 def bridged_gaps_said(log: LaserLog, gaps: Sequence[BridgedGap]) -> list[str]:
     """What is said of gaps of a log's odometry that were bridged."""
+    if not gaps:
+        return []
     named = [
         f"{gap.path:.1f} m where scans alone have {gap.mapped:.1f} m from scan {log.numbers[gap.first - 1]} "
         f"to {log.numbers[gap.end]}"
@@ -153,4 +146,4 @@ def bridged_gaps_said(log: LaserLog, gaps: Sequence[BridgedGap]) -> list[str]:
         "the walls do not show how far the robot went while odometry is missing, but its poses on both sides "
         f"do: {shortened_list(named)}; it is taken to have driven that steadily; --as-recorded leaves it to "
         "the scans"
-    ][: len(gaps)]
+    ]

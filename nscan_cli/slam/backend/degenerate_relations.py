@@ -53,7 +53,7 @@ def degenerate_stretches(
         return []
     along = path_lengths(poses)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
-    speed, ways = _usual_speed(poses, times, weakest_sigmas <= options.sigma, options), []
+    speed, ways = usual_speed(poses, times, weakest_sigmas <= options.sigma, options.least_speed), []
     for piece in pieces:
         begin, last = max(int(piece[0]) - 1, 0), int(piece[-1])
         possible = speed * float(times[last] - times[begin])
@@ -63,10 +63,13 @@ def degenerate_stretches(
     return ways
 
 
-def _usual_speed(poses: Array, times: Array, is_told: Mask, options: DegenerateStretchOptions) -> float:
-    """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
+def usual_speed(poses: Array, times: Array, is_told: Mask, least_speed: float) -> float:
+    """The median speed (m/s) along a path (S, 3) of a robot that moves, where it `is_told` (S,).
+
+    The poses are at times (S,), s. A slower robot than `least_speed` (m/s) stands. 0 if it never moves.
+    """
     speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), SHORTEST_PERIOD)
-    moves = speeds > options.least_speed
+    moves = speeds > least_speed
     told = moves & is_told[1:]
     chosen = told if told.any() else moves
     return float(np.median(speeds[chosen])) if chosen.any() else 0.0
