@@ -94,15 +94,15 @@ def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions
     Or whether others fit hardly better than it, so that more pairs would not make one certain.
     """
     pairs, best = len(evidence.energies), evidence.sharpest
-    if pairs >= options.least_decisive and evidence.sigmas(best, told) < options.hopeless_sigmas:
-        return True
-    if best == told:
-        least = options.settled_sigmas if pairs >= options.least_pairs else np.inf
-    elif pairs >= options.least_decisive and evidence.sigmas(best, told) >= options.decided_sigmas:
-        least = options.settled_sigmas
-    else:
+    if pairs < options.least_pairs or evidence.is_little:
         return False
-    return all(evidence.sigmas(best, sweep) >= least for sweep in evidence.sweeps.tolist() if sweep != best)
+    is_decisive, certainty = pairs >= options.least_decisive, evidence.sigmas(best, told)
+    if certainty < options.hopeless_sigmas and (is_decisive or best != told):
+        return True
+    if best != told and not (is_decisive and certainty >= options.decided_sigmas):
+        return False
+    others = (sweep for sweep in evidence.sweeps.tolist() if sweep != best)
+    return all(evidence.sigmas(best, sweep) >= options.settled_sigmas for sweep in others)
 
 
 def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> SweepEvidence:

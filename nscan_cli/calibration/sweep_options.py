@@ -82,7 +82,8 @@ class SweepCheckOptions:
     """A pair that is farther from the median than this number of standard deviations counts as if it were so
     far: matches slip. A larger value gives such pairs more weight."""
     least_pairs: int = 5
-    """Least number of pairs after which the file can count as right. More take longer where it is."""
+    """Least number of pairs after which the file can count as right, or another time as hopeless. More take
+    longer where it is."""
     settled_sigmas: float = 1.5
     """The comparison ends once the best time, the file's or one that is decided, makes scans sharper than all
     others by this number of standard deviations. A larger value takes longer."""
@@ -92,12 +93,11 @@ class SweepCheckOptions:
     dropped_sigmas: float = 2.0
     """A time that fits worse than the file's by this number of standard deviations is not tried on more
     pairs. A larger value takes longer."""
-    hopeless_sigmas: float = 0.5
+    hopeless_sigmas: float = 1.0
     """The comparison also ends once the best time makes scans sharper than the file's by less than this
     number of standard deviations. A larger value takes less time, and leaves the file as it is more often."""
     least_decisive: int = 10
-    """Least number of pairs after which another time is decided, a time is dropped, or the comparison ends as
-    hopeless. More take longer."""
+    """Least number of pairs after which another time is decided, or a time is dropped. More take longer."""
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot must move differently there and see the same.
     More shifts find more pairs and take longer."""

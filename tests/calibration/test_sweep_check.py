@@ -11,7 +11,10 @@ import pytest
 
 from nscan_cli.calibration.file_check import CheckedFile, checked_file
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_evidence import sweep_evidence
 from nscan_cli.logs.load import log_from, read_log
+from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import relative
@@ -140,3 +143,22 @@ def test_real_lasers(name, used):
     log = read_log(str(data_file(name)))
     found = checked_file(log, ReadingOptions(), FileCheckOptions()).reading.sweep
     assert found is None if used is None else found == pytest.approx(used, abs=2e-4)
+
+
+def test_the_few_turns_of_half_a_drive_are_all_compared():
+    """Pairs that begin with the same few scans end no comparison."""
+    log = read_log(str(data_file("field/rplidar-hallway.bag")))
+    half = excerpt(log, slice(len(log) // 2, None))
+    found = checked_file(half, ReadingOptions(), FileCheckOptions()).reading.sweep
+    assert found == pytest.approx(-0.0695, abs=2e-4)
+
+
+def test_a_laser_that_sees_at_once_is_soon_known():
+    """Its other times fit hardly better after some pairs, so that the others are not matched."""
+    log, options = read_log(str(data_file("field/mocap.bag"))), FileCheckOptions()
+    motion, period = (
+        ScanMotion.of_log(log, options.steps, options.sweep),
+        float(np.median(np.diff(log.times))),
+    )
+    evidence = sweep_evidence(motion, (0.0, period, -period, 0.5 * period, -0.5 * period), 0.0, options.sweep)
+    assert len(evidence.energies) == options.sweep.least_pairs
