@@ -6,6 +6,7 @@ They do what the commands do, on objects in place of files. Modules are imported
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -112,6 +113,7 @@ def make_grid(log: LaserLog, graph: Graph, resolution: float = 0.05) -> Occupanc
         raise WrongUsageError(
             f"{log.source.name}: lacks scans of the graph; read the log that the graph was made from"
         )
+    log = dataclasses.replace(log, mapped_path=graph.path)
     return occupancy_grid(log, rows, graph.poses, resolution, available_threads())
 
 

@@ -20,6 +20,15 @@ if TYPE_CHECKING:
 
 PAIR_WIDTH = 1600
 """Pixels of two maps beside each other."""
+TURNING_LASERS: dict[str, tuple[str, ...]] = {
+    "rplidar-floor": (),
+    "rplidar-hallway.bag": (),
+    "neato.bag": ("--topic", "/stable_scan"),
+    "urg-corridor-1.bag": (),
+    "urg-corridor-2.bag": (),
+    "urg-carried.bag": (),
+}
+"""Recordings of lasers that turn, and the options to read them with."""
 
 
 def main(folder: str) -> None:
@@ -74,15 +83,13 @@ def _of_real_logs(scratch: Path) -> dict[str, Image]:
 
 def _of_turning_lasers(scratch: Path) -> dict[str, Image]:
     """Each as if the laser saw at once, and with every beam from where the robot was."""
-    found = {
-        name: find_data(f"field/{name}{ending}")
-        for name, ending in (("rplidar-floor", ""), ("rplidar-hallway", ".bag"))
-    }
-    return {
-        f"{name}-turn": _beside(_map(log, scratch, "--sweep", "off"), _map(log, scratch))
-        for name, log in found.items()
-        if log is not None
-    }
+    pictures = {}
+    for name, options in TURNING_LASERS.items():
+        log = find_data(f"field/{name}")
+        if log is not None:
+            at_once = _map(log, scratch, "--sweep", "off", *options)
+            pictures[f"{log.stem}-turn"] = _beside(at_once, _map(log, scratch, *options))
+    return pictures
 
 
 def _map(log: Path, scratch: Path, *options: str) -> Image:

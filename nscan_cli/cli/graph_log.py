@@ -54,7 +54,7 @@ def read_graph_log(
     if not there.all() and not some_left_out:
         number = int(graph.scans[np.argmin(there)])
         raise InputDataError(path, f"has no scan {number}, which {graph_file} has", GRAPH_LOG_REMEDY)
-    return log, np.flatnonzero(there), rows[there]
+    return dataclasses.replace(log, mapped_path=graph.path), np.flatnonzero(there), rows[there]
 
 
 def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:

@@ -94,7 +94,7 @@ def run_on_log(
         with progress("mapping again", None, quiet):
             add_verification(state, graph, verification, threads)
     # As the check of the file has corrected it.
-    scans = state.recorded
+    scans = dataclasses.replace(state.recorded, mapped_path=graph.path)
     later = notices_of_mapping(scans, graph)
     for warning in later:
         say(f"warning: {warning}", quiet)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from nscan_cli.graph.relations.nscan import NScan
 from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
 from nscan_cli.poses import Array, Indices, are_known, compose, relative, rotated_information
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.robot_path import RobotPath
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
@@ -53,6 +56,9 @@ class Graph:
     loops: list[Loop] = field(default_factory=list)
     marginals: dict[int, Array] = field(default_factory=dict)
     """Keyframe id → (3, 3) marginal covariance of its global pose, the first keyframe held fixed."""
+    path: RobotPath | None = None
+    """The path of the robot between the poses, if the laser turns: it is known more finely than by one pose a
+    scan. Where the poses have moved since, the path between them goes along. None where it is not known."""
     vertices: list[int] | None = None
     """(N,) the vertex keys in the g2o file, up to 64 bits; None where they are the scan numbers."""
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -20,7 +20,7 @@ from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.odometry_interpolation import moved_odometry
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import RobotPath, likelier_path, robot_path
+from nscan_cli.logs.robot_path import RobotPath, bent_path, likelier_path, robot_path
 from nscan_cli.poses import Array, Indices, compose
 
 SCANS_AT_ONCE = 256
@@ -119,6 +119,8 @@ class LaserLog:
     others, or there is none."""
     path: RobotPath | None = None
     """How the robot moves while the laser turns; None: as if it stood. See `moving_along`."""
+    mapped_path: RobotPath | None = None
+    """The path of a graph, which tells the motion between its poses best; None: not known."""
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -213,7 +215,8 @@ class LaserLog:
         """The log with every beam seen from where the robot was, if the laser turns: `points` are corrected.
 
         `poses` (N, 3) are the robot's in some rows (N,), increasing, or in all; None: as far as odometry
-        tells them. Between two of them it moves as odometry says, or steadily if that is likelier.
+        tells them. Between two of them it moves as on the mapped path; without one as odometry says, or
+        steadily if that is likelier.
         """
         if self.beam_times is None:
             return self
@@ -222,6 +225,8 @@ class LaserLog:
                 return replace(self, path=None)
             return replace(self, path=self.odometry_path or robot_path(self.times, self.odometry))
         times = self.times if rows is None else self.times[rows]
+        if self.mapped_path is not None:
+            return replace(self, path=bent_path(self.mapped_path, times, poses))
         if self.odometry is None or self.odometry_path is None:
             return replace(self, path=robot_path(times, poses))
         return replace(self, path=likelier_path(self.odometry_path, times, poses))

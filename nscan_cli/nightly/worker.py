@@ -7,6 +7,7 @@ JSON, and exits when its standard input is closed, since its parent has then end
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import sys
@@ -83,7 +84,7 @@ def map_and_evaluate(
     if bound is not None:
         add_verification(state, graph, VerificationOptions(bound=bound), task["threads"])
     # As the check of the file has corrected it.
-    log, rows = state.recorded, np.arange(len(log))
+    log, rows = dataclasses.replace(state.recorded, mapped_path=graph.path), np.arange(len(log))
     grid = occupancy_grid(log, rows, graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))

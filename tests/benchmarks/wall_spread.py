@@ -14,10 +14,11 @@ import numpy as np
 
 from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, transform
+from nscan_cli.poses import transform
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
@@ -30,6 +31,7 @@ LOGS = {
     "neato.bag": ReadingOptions(topic="/stable_scan"),
     "urg-corridor-1.bag": ReadingOptions(),
     "urg-corridor-2.bag": ReadingOptions(),
+    "urg-carried.bag": ReadingOptions(),
 }
 CELL = 0.5
 """m"""
@@ -39,9 +41,10 @@ LONGER = 2.0
 """Along the line the points of such a cell spread so many times as far as across it."""
 
 
-def wall_spread(log: LaserLog, poses: Array) -> float:
-    """m; the median spread of the points of all scans, at poses (S, 3), across the walls."""
-    moving = log.moving_along(poses)
+def wall_spread(log: LaserLog, graph: Graph) -> float:
+    """m; the median spread of the points of all scans, at the poses of the graph, across the walls."""
+    poses = graph.poses
+    moving = replace(log, mapped_path=graph.path).moving_along(poses)
     points = np.concatenate([
         transform(pose, seen) for pose, seen in zip(poses, moving.points_by_scan(), strict=True)
     ])  # fmt: skip
@@ -62,7 +65,7 @@ def _measured(name: str, options: ReadingOptions) -> float | None:
         return None
     log = checked_file(read_log(str(path), options), options, FileCheckOptions()).log
     graph = run_slam(SlamState.of_log(log, SlamOptions()), lambda scans, keyframes: None)
-    return wall_spread(log, graph.poses)
+    return wall_spread(log, graph)
 
 
 def main() -> None:

@@ -8,9 +8,13 @@ import functools
 import numpy as np
 
 from nscan_cli.evaluation.alignment import alignment
+from nscan_cli.graph.model import turned_graph
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.mapping.occupancy import OCCUPIED, occupancy_grid
 from nscan_cli.poses import compose, wrap
 from tests.benchmarks.lasers import turning
+from tests.data import data_file
 from tests.logs.excerpts import truth_of
 from tests.simulation.drive import Drive
 from tests.simulation.office import office_way, office_world
@@ -38,9 +42,10 @@ def errors(found: Mapped) -> tuple[float, float]:
     return rms, float(np.degrees(np.abs(wrap(off[:, 2])).max()))
 
 
-def occupied_cells(found: Mapped) -> int:
-    rows = np.arange(len(found.log))
-    return int(np.count_nonzero(occupancy_grid(found.log, rows, found.graph.poses).states() == OCCUPIED))
+def occupied_cells(found: Mapped, resolution: float = 0.05) -> int:
+    log, rows = dataclasses.replace(found.log, mapped_path=found.graph.path), np.arange(len(found.log))
+    grid = occupancy_grid(log, rows, found.graph.poses, resolution)
+    return int(np.count_nonzero(grid.states() == OCCUPIED))
 
 
 def test_a_drive_with_fast_turns_is_mapped_as_by_a_laser_that_sees_at_once():
@@ -68,3 +73,24 @@ def test_without_odometry_the_scans_tell_where_the_robot_is_between_two_turns_of
     assert uncorrected[0] > 2 * swept[0]
     assert swept[1] <= max(2 * at_once[1], 0.4)
     assert uncorrected[1] > 20 * swept[1]
+
+
+def test_the_path_of_the_graph_makes_maps_sharper_than_its_poses_alone():
+    """The robot sways within a turn of the laser, which poses at its first beams do not tell."""
+    log = read_log(str(data_file("field/urg-corridor-2.bag")), ReadingOptions(odometry=False))
+    found = mapped(log)
+    without = dataclasses.replace(found, graph=dataclasses.replace(found.graph, path=None))
+    assert occupied_cells(found) < 0.95 * occupied_cells(without)
+
+
+def test_the_path_goes_along_with_the_poses():
+    found = mapped(recorded(0.2).log())
+    log = dataclasses.replace(found.log, mapped_path=found.graph.path)
+    turned = turned_graph(found.graph, 0.7)
+    for row in (5, 150):
+        seen = log.moving_along(found.graph.poses).points(row)
+        np.testing.assert_allclose(log.moving_along(turned.poses).points(row), seen, atol=1e-9)
+
+
+def test_a_laser_that_sees_at_once_needs_no_path():
+    assert mapped(recorded(0.0).log()).graph.path is None

@@ -112,11 +112,11 @@ class JsonRecord:
     def number(self, key: str) -> float:
         """A finite number."""
         error = self.wrong(key, "a finite number")
-        return float(_checked_numbers([self.get(key)], 1, error)[0])
+        return float(bounded_numbers([self.get(key)], 1, error)[0])
 
     def pose(self, key: str) -> Array:
         """(3,) x, y, φ."""
-        return _checked_numbers(
+        return bounded_numbers(
             self.get(key), 3, self.wrong(key, f"a pose of three {_bounded(DISTANCE)}"), DISTANCE
         )
 
@@ -126,7 +126,7 @@ class JsonRecord:
         error = self.wrong(key, f"a list of {count} poses of three {_bounded(DISTANCE)}")
         if not isinstance(values, list) or len(values) != count:
             raise error
-        return np.array([_checked_numbers(value, 3, error, DISTANCE) for value in values])
+        return np.array([bounded_numbers(value, 3, error, DISTANCE) for value in values])
 
     def information(self, key: str, size: int, fixed: int | None = None) -> Array:
         """The positive semi-definite matrix (size, size) of an upper triangle.
@@ -137,7 +137,7 @@ class JsonRecord:
         count = size * (size + 1) // 2
         numbers = f"{count} {_bounded(INFORMATION)}"
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
-        matrix = from_upper_triangle(_checked_numbers(self.get(key), count, error, INFORMATION), size)
+        matrix = from_upper_triangle(bounded_numbers(self.get(key), count, error, INFORMATION), size)
         block: Any = ...
         if fixed is not None:
             others = np.delete(np.arange(size), slice(3 * fixed, 3 * fixed + 3))
@@ -165,7 +165,8 @@ def _bounded(limit: Limit) -> str:
     return f"finite numbers up to {limit.value:g}"
 
 
-def _checked_numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
+def bounded_numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
+    """A list of `count` finite numbers as an array, none beyond the limit. Raises the error."""
     if not isinstance(values, list) or len(values) != count:
         raise error
     # A bool is an int in Python, but not a number in JSON.

@@ -29,6 +29,7 @@ from nscan_cli.graph.io.json_fields import (
     rounded_upper_triangle,
     six_digits,
 )
+from nscan_cli.graph.io.path_records import path_of_records, path_records
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relations.registry import relation_of, relation_record
 from nscan_cli.logs.compression import compression_of
@@ -59,6 +60,7 @@ def write_graph(graph: Graph) -> bytes:
     in the provenance that is not finite.
     """
     check_finite("the poses of the graph", graph.poses, graph.known_odometry)
+    check_finite("the path of the graph", None if graph.path is None else graph.path.poses)
     check_finite("the covariances of the graph", *graph.marginals.values())
     for relation in graph.relations:
         term = relation.term()
@@ -78,6 +80,8 @@ def write_graph(graph: Graph) -> bytes:
             for node, covariance in sorted(graph.marginals.items())
         ),
     }
+    if graph.path is not None:
+        lists["path"] = path_records(graph.path)
     # Record by record: all records as lists of numbers take many times the memory of the document.
     document = io.BytesIO()
     for key, value in head.items():
@@ -188,6 +192,7 @@ def _graph_of_document(document: JsonRecord) -> Graph:
         if node in graph.marginals:
             raise MalformedError(record.place, f"node {node} has a covariance already")
         graph.marginals[node] = record.information("covariance", 3)
+    graph.path = path_of_records(document)
     return graph
 
 
