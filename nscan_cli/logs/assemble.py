@@ -143,7 +143,10 @@ def laser_log(
     if floor is not None:
         lost.counts["of the floor"] = without_floor(ranges, angle_min[rows], angle_increment[rows], floor)
         masked.append(floor.said)
-    offset, of_offset = checked_offset(ranges, angle_increment[rows], options)
+    offset, of_offset = 0.0, list[str]()
+    # An angle between beams that is wrong, and stays so, bends walls, too.
+    if options.range_offset is not None or not told or angle_increment is not written.step:
+        offset, of_offset = checked_offset(ranges, angle_increment[rows], options)
     contradictions += of_offset
     if offset:
         ranges += np.float32(offset)

@@ -1,7 +1,8 @@
 """The angle between beams, checked by walls: a wrong one bends them.
 
 Where the angle of the log is far off (15 %), it is enough that most beams on walls tell another one. Where it
-is nearly right, most parts of the log must tell about the same other one.
+is nearly right, most parts of the log must tell about the same other one; or walls are square to each other
+with another one (square_walls.py), which tells a percent.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_parts import evenly
+from nscan_cli.logs.square_walls import SeenSquare, SquareWallOptions, told_by_square_walls
 from nscan_cli.logs.wall_angles import (
     BeamSpacingOptions,
     SampledScans,
@@ -35,13 +38,24 @@ def checked_by_walls(
         return directions, []
     beams = beam_counts(raw.ranges, raw.beams)
     rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
-    widest = float(np.max(np.abs(directions.step) * (beams - 1)))
+    widest, factor, square = float(np.max(np.abs(directions.step) * (beams - 1))), 1.0, None
     # Walls mostly agree with the log, and a few scans show it.
-    if _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of])):
+    if not _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of])):
+        scans = sampled_scans(raw, directions, limits, rows)
+        factor = _factor_of_walls(scans) or _factor_of_parts(scans) or 1.0
+    is_bent = factor != 1.0
+
+    def sample(count: int) -> SampledScans:
+        """So many scans, with the angle that straight walls tell."""
+        some = sampled_scans(raw, directions, limits, evenly(len(beams), count))
+        return SampledScans(some.ranges, factor * some.steps)
+
+    if factor * widest <= SquareWallOptions().max_view:
+        square = told_by_square_walls(sample)
+    if square is None and not is_bent:
         return directions, []
-    scans = sampled_scans(raw, directions, limits, rows)
-    factor = _factor_of_walls(scans) or _factor_of_parts(scans)
-    if factor is None or factor * widest > spacing.max_view:
+    told = factor * (square.factor if square is not None else 1.0)
+    if told * widest > spacing.max_view:
         return directions, []
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
@@ -50,19 +64,21 @@ def checked_by_walls(
     first, step = (float(np.median((values * orders)[of_count])) for values in directions)
     if np.median(orders) < 0:
         first, step = -first, -step
-    view, is_usual = _view(abs(step) * factor * (count - 1), factor, count)
+    view, is_usual = _view(abs(step) * told * (count - 1), told, count, not is_bent)
     found = math.copysign(_between(view, count), step)
+    if square is not None and not is_bent and not _contradicts(square, found / step, is_usual):
+        return directions, []
     centred = -math.copysign(view, step) / 2
+    seen, not_seen = ("straight", "bent") if is_bent else ("square to each other", "not")
     said = (
-        f"walls are straight with {_degrees(abs(found))}° from beam to beam, {count} beams over "
+        f"walls are {seen} with {_degrees(abs(found))}° from beam to beam, {count} beams over "
         f"{_degrees(view)}°; with the {_degrees(abs(step))}° of "
-        f"{'the convention for such logs' if raw.angles_assumed else 'the log'} they are bent"
+        f"{'the convention for such logs' if raw.angles_assumed else 'the log'} they are {not_seen}"
     )
-    by_log, by_walls = (
-        abs(2 * first + angle * (count - 1)) < spacing.max_off_centre * abs(angle) for angle in (step, found)
-    )
-    is_centred = raw.angles_assumed or by_log or by_walls
-    if by_walls:
+    off_by_log, off_by_walls = (abs(2 * first / angle + count - 1) for angle in (step, found))
+    is_centred = raw.angles_assumed or min(off_by_log, off_by_walls) < spacing.max_off_centre
+    if off_by_walls <= min(off_by_log, spacing.max_off_centre):
+        # The first direction of the log is that of a laser that looks ahead.
         centred = first
     if is_usual and is_centred and of_count.all() and options.angle_min is None:
         same = orders * np.sign(step)
@@ -74,6 +90,13 @@ def checked_by_walls(
     sign = -1 if options.flip else 1
     start = f" --angle-min {_degrees(sign * centred)}" if is_centred else ""
     return directions, [f"{said}; try --angle-increment {_degrees(sign * found)}{start}"]
+
+
+def _contradicts(square: SeenSquare, factor: float, is_usual: bool) -> bool:
+    """Whether walls that are square contradict the angle of the log; `factor` leads from it to the one that
+    they tell, or one near that with a usual view."""
+    options = SquareWallOptions()
+    return abs(math.log(factor)) >= options.min_share if is_usual else square.is_clear(options)
 
 
 def _degrees(angle: float) -> str:
@@ -186,13 +209,15 @@ def _told_factor(scans: SampledScans, half_width: float) -> float | None:
     return factor if abs(math.log(factor)) >= options.min_difference else None
 
 
-def _view(view: float, factor: float, beams: int) -> tuple[float, bool]:
+def _view(view: float, factor: float, beams: int, is_square: bool) -> tuple[float, bool]:
     """The field of view (rad) of so many beams that walls tell, or a usual one near it; and whether it is
-    that. `factor` is that of the log's angle."""
+    that. `factor` is that of the log's angle, and `is_square` whether only walls that are square tell it."""
     options = BeamSpacingOptions()
     usual = min(options.usual_views, key=lambda angle: abs(math.log(angle / view)))
     near = options.usual_view
-    if abs(math.log(factor)) < options.min_difference:
+    if is_square:
+        near = options.usual_view_square
+    elif abs(math.log(factor)) < options.min_difference:
         near = options.usual_view_round if _is_round(_between(usual, beams)) else options.usual_view_near
     is_usual = abs(math.log(usual / view)) <= near
     return (usual if is_usual else view), is_usual

@@ -30,6 +30,7 @@ from nscan_cli.logs.rounded_ranges import RoundedRangeOptions
 from nscan_cli.logs.scan_order import ScanOrderOptions
 from nscan_cli.logs.shared_stamps import SharedStampOptions
 from nscan_cli.logs.slow_odometry import SlowOdometryOptions
+from nscan_cli.logs.square_walls import SquareWallOptions
 from nscan_cli.logs.stamp_unit import StampUnitOptions
 from nscan_cli.logs.sweep import SweepOptions
 from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
@@ -75,6 +76,8 @@ class ScanCheckOptions:
     """Whether directions change in the file alone."""
     beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
     """Whether walls fit the angle between beams."""
+    square_walls: SquareWallOptions = field(default_factory=SquareWallOptions)
+    """Whether walls are square to each other with it."""
     range_offset: RangeOffsetOptions = field(default_factory=RangeOffsetOptions)
     """Whether a length is added to all ranges."""
     whole_turn: WholeRevolutionOptions = field(default_factory=WholeRevolutionOptions)

@@ -83,6 +83,9 @@ class BeamSpacingOptions:
     usual_view_round: float = 0.03
     """Largest difference from a usual view, as a share, where moreover the angle from beam to beam would be a
     multiple of a quarter of a degree. A larger value puts more logs right."""
+    usual_view_square: float = 0.012
+    """Largest difference from a usual view, as a share, that walls tell which are square to each other. A
+    larger value puts more logs right."""
     moved: float = 0.01
     """Least median change of the readings between two scans that are tested, as a share: a robot that stands
     sees one scene only. A larger value tests fewer scans."""
