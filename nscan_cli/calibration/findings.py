@@ -21,7 +21,7 @@ from nscan_cli.poses import MIRRORED, Array
 UNDONE = "--as-recorded uses it as it is"
 AGREES = "; meanwhile odometry is changed to agree with the scans"
 RANGE_UNITS = {"feet": 0.3048, "inches": 0.0254}
-"""Units of ranges, in metres. Odometry is hardly ever wrong by such a factor: it must be the ranges."""
+"""Units of ranges, in metres. Odometry that someone converted twice is off by such a factor, too."""
 
 
 @dataclass(frozen=True)
@@ -199,25 +199,32 @@ def wrong_turns(turns: TurnFit) -> Finding:
 
 
 def wrong_scale(
-    fit: MountFit, are_ranges_likelier: bool, reading: ReadingOptions, options: FileCheckOptions
+    fit: MountFit, ranges_likelier: float, reading: ReadingOptions, options: FileCheckOptions
 ) -> Finding:
-    """Odometry counts in another unit than the ranges, beyond doubt or likely."""
+    """Odometry counts in another unit than the ranges, beyond doubt or likely.
+
+    The ranges are so many times as likely to be wrong as odometry.
+    """
     decimal = 10.0 ** round(math.log10(fit.scale))
     is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
     scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
     evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
     for unit, metres in RANGE_UNITS.items():
         if abs(fit.scale * metres - 1.0) <= options.range_unit_tolerance:
+            in_metres = f"--range-scale {(reading.range_scale or 1.0) * metres:g}"
+            multiplied = f"positions by odometry are multiplied, as by --odometry-scale {scale:g}"
             return Finding(
-                f"the ranges are likely in {unit}: {evidence}; try --range-scale "
-                f"{(reading.range_scale or 1.0) * metres:g}; as it is, the map is in {unit}, and "
-                f"positions by odometry are multiplied, as by --odometry-scale {scale:g}; {UNDONE}",
+                f"the ranges are likely in {unit}: {evidence}; try {in_metres}; as it is, the map is in "
+                f"{unit}, and {multiplied}; {UNDONE}"
+                if ranges_likelier > options.likelier_unit_factor
+                else f"{evidence}: {multiplied}; if the ranges are in {unit} instead, and the map is too "
+                f"large, {in_metres}; {UNDONE}",
                 {"odometry_scale": scale},
             )
     ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
     is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= options.max_range_factor
     is_clear = max(fit.scale, 1.0 / fit.scale) > options.clear_scale_factor
-    if is_either and are_ranges_likelier:
+    if is_either and ranges_likelier > options.likelier_factor:
         length, size, speed = ("short", "small", "fast") if fit.scale < 1.0 else ("long", "large", "slow")
         return Finding(
             f"the ranges, and so the size of the map, are likely too {length}: {evidence}, and rooms "

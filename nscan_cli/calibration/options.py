@@ -183,6 +183,10 @@ class FileCheckOptions:
     likelier_factor: float = 2.5
     """The ranges are named first where they are likelier wrong than odometry by this factor. A larger value
     names odometry more often."""
+    likelier_unit_factor: float = 0.35
+    """And by this one where the ranges may be in feet or inches, which is likelier than any other factor: it
+    is 0.5 of intel in feet, and 0.1 to 0.23 of logs whose odometry is too short by that. A larger value names
+    odometry more often."""
     max_turn_error: float = 0.3
     """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
     min_opposite_share: float = 0.8

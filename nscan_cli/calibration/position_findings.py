@@ -95,7 +95,7 @@ def _of_scale(
 ) -> list[Finding]:
     if not is_wrong_scale(fit, options):
         return []
-    return [findings.wrong_scale(fit, evidence.are_ranges_likelier(fit.scale), reading, options)]
+    return [findings.wrong_scale(fit, evidence.ranges_over_odometry(fit.scale), reading, options)]
 
 
 def _looks_back(mount: Array, fit: MountFit, options: FileCheckOptions) -> bool:

@@ -119,18 +119,15 @@ class StepEvidence:
         sigmas = length_sigmas(self.laser, self.both.covariances)
         return scale_change(self.laser, self.odometry, sigmas, self.fit, self.options.change)
 
-    def are_ranges_likelier(self, scale: float) -> bool:
-        """Whether the ranges are clearly likelier than odometry to be wrong, if one metre by odometry is
-        `scale` (m) by scans."""
+    def ranges_over_odometry(self, scale: float) -> float:
+        """How much likelier, as a factor, the ranges are to be wrong than odometry, if one metre by odometry
+        is `scale` (m) by scans."""
         moving, ends = self._is_moving, (self.both.first, self.both.last)
         lasted = (self._log.times[ends[1]] - self._log.times[ends[0]])[moving]
         speed = float(np.median(np.hypot(*self.odometry[moving, :2].T) / lasted))
-        seen, options = self._log.ranges[ends[0]], self.options
+        seen = self._log.ranges[ends[0]]
         usual = float(np.median(seen[np.isfinite(seen)]))
-        return (
-            speed > 0.0
-            and ranges_over_odometry(usual, speed, 1.0 / scale, options.expected) > options.likelier_factor
-        )
+        return ranges_over_odometry(usual, speed, 1.0 / scale, self.options.expected) if speed > 0.0 else 0.0
 
     def turn_change(self, least: int) -> TurnChange | None:
         """The clearest change of the signs of turns, with at least so many turns before and behind."""

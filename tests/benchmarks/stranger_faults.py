@@ -64,6 +64,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: odometry_faults.scaled_in(log, 1000.0, slice(len(log) // 2, None)),
         "in millimetres, elsewhere in metres",
     ),
+    ("odometry × 0.3048", lambda log: odometry_faults.scaled(log, 0.3048), "odometry-scale 3"),
     ("odometry × 0.01", lambda log: odometry_faults.scaled(log, 0.01), "odometry-scale (100|9|10)"),
     ("odometry × 2", lambda log: odometry_faults.scaled(log, 2.0), "scale of odometry"),
     ("odometry × 0.5", lambda log: odometry_faults.scaled(log, 0.5), "scale of odometry"),
@@ -180,6 +181,10 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         "walls are straight|as if it were one turn",
     ),
     ("beams wider by 1 %", lambda log: faults.beams_apart(log, 1.01), "as if it were one turn"),
+    ("beams wider by 2 %",
+        lambda log: faults.beams_apart(log, 1.02),
+        "as if it were one turn|square to each other",
+    ),
     ("halves of the scans exchanged",
         lambda log: replace(log, ranges=np.roll(log.ranges, log.ranges.shape[1] // 2, axis=1)),
         "begin in the middle of the scan|looks 180",
@@ -234,7 +239,7 @@ FAULTS_OF_REAL_LOGS = (
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth", "looks 90° left in the middle third", "beams wider by 10 %",
-    "20 % of the readings say 2 m", "noise of 0.1 m on the ranges",
+    "beams wider by 2 %", "20 % of the readings say 2 m", "noise of 0.1 m on the ranges",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
 FAULTS_OUTDOORS = (

@@ -258,6 +258,14 @@ def test_ranges_in_feet_are_no_odometry_in_another_unit():
     assert checked.reading.odometry_scale == pytest.approx(1 / 0.3048, rel=0.02)
 
 
+def test_odometry_that_is_converted_to_metres_twice_is_no_range_in_feet():
+    """Rooms and speed are as expected once it is multiplied, so the map is not said to be in feet."""
+    checked = checked_file(odometry_faults.scaled(drive(), 0.3048), ReadingOptions(), FileCheckOptions())
+    (message,) = checked.messages
+    assert re.search(r"^one metre by odometry is 3\.\d+ m.* as by --odometry-scale 3\.\d+; if the", message)
+    assert "if the ranges are in feet instead, and the map is too large, --range-scale 0.3048" in message
+
+
 def test_scans_that_stay_the_same_while_the_robot_drives():
     """The laser sees what goes along with the robot: odometry is not blamed for it."""
     log = drive()
