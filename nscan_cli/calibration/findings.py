@@ -215,7 +215,7 @@ def wrong_scale(
             multiplied = f"positions by odometry are multiplied, as by --odometry-scale {scale:g}"
             return Finding(
                 f"the ranges are likely in {unit}: {evidence}; try {in_metres}; as it is, the map is in "
-                f"{unit}, and {multiplied}; {UNDONE}"
+                f"{unit}, unless odometry is wrong instead, and {multiplied}; {UNDONE}"
                 if ranges_likelier > options.likelier_unit_factor
                 else f"{evidence}: {multiplied}; if the ranges are in {unit} instead, and the map is too "
                 f"large, {in_metres}; {UNDONE}",

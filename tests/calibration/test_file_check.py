@@ -260,7 +260,8 @@ def test_ranges_in_feet_are_no_odometry_in_another_unit():
 
 def test_odometry_that_is_converted_to_metres_twice_is_no_range_in_feet():
     """Rooms and speed are as expected once it is multiplied, so the map is not said to be in feet."""
-    checked = checked_file(odometry_faults.scaled(drive(), 0.3048), ReadingOptions(), FileCheckOptions())
+    log = odometry_faults.scaled(read_log(OFFICE_LOG), 0.3048)
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
     (message,) = checked.messages
     assert re.search(r"^one metre by odometry is 3\.\d+ m.* as by --odometry-scale 3\.\d+; if the", message)
     assert "if the ranges are in feet instead, and the map is too large, --range-scale 0.3048" in message
