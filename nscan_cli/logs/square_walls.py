@@ -193,7 +193,9 @@ def _walls(scans: SampledScans, width: float, options: SquareWallOptions) -> _Wa
     """Lines through the beams over a width (rad), each half a width from the next, by total least squares."""
     ranges, size = scans.ranges, scans.ranges.shape[1]
     step = float(np.median(scans.steps)) if len(ranges) else 0.0
-    half = max(round(0.5 * width / step), (options.least_beams - 1) // 2) if step > 0.0 else size
+    # A damaged log may have hardly any angle between beams, or one that is no number.
+    half = round(min(0.5 * width / step, size)) if 0.0 < step < np.inf else size
+    half = max(half, (options.least_beams - 1) // 2)
     middles = np.arange(half, size - half, half)
     bearings = scans.steps[:, np.newaxis] * np.arange(size)
     with np.errstate(invalid="ignore"):

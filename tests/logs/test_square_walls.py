@@ -77,6 +77,13 @@ def test_readings_without_walls_tell_nothing():
     assert told_by_square_walls(lambda _count: SampledScans(np.zeros((0, 181)), np.zeros(0))) is None
 
 
+@pytest.mark.parametrize("step", [0.0, 1e-300, 1e300, np.inf, np.nan])
+def test_a_damaged_angle_tells_nothing(step):
+    scans = SampledScans(np.ones((9, 2)), np.full(9, step))
+    with np.errstate(invalid="ignore"):
+        assert told_by_square_walls(lambda _count: scans) is None
+
+
 @pytest.mark.parametrize("factor", [0.95, 1.03])
 @pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel"])
 def test_a_real_log_with_a_wrong_step_is_put_right(reread, name, factor):
