@@ -25,8 +25,9 @@ from nscan_cli.poses import Array
 class SquareWallOptions:
     """When pairs of walls tell the angle between beams."""
 
-    scans: tuple[int, int] = (200, 500)
-    """Numbers of scans that are looked at, evenly spread: the second where the first show few pairs."""
+    scans: tuple[int, ...] = (80, 320)
+    """Numbers of scans that are looked at, evenly spread: more of them where fewer show few pairs, or do not
+    agree with the log. More take longer."""
     widths: tuple[float, ...] = (0.2, 0.4)
     """Beams over these angles are fitted as walls, rad. Wider ones tell their direction more precisely, and
     there are fewer."""
@@ -62,6 +63,9 @@ class SquareWallOptions:
     """Number of fits from the best of these on. More are more precise."""
     enough_pairs: int = 1500
     """With fewer pairs than this more scans are looked at. A larger value takes longer."""
+    sound_share: float = 0.004
+    """The angle of the log is right without looking at more scans if the share is smaller. A larger value
+    takes less time."""
     min_pairs: int = 400
     """Least number of pairs that decide. A larger value decides for fewer logs."""
     parts: int = 4
@@ -129,13 +133,17 @@ def told_by_square_walls(
 ) -> SeenSquare | None:
     """With what most pairs of walls of a log are square; None if that is its angle between beams, or they
     tell too little. `sample` gives so many of its scans."""
-    few, more = options.scans
-    pairs = wall_pairs(sample(few), options)
-    if len(pairs.excess) < options.enough_pairs:
-        pairs = wall_pairs(sample(more), options)
+    for count in options.scans:
+        pairs = wall_pairs(sample(count), options)
+        if len(pairs.excess) < options.min_pairs:
+            continue
+        found = seen_square(pairs, options)
+        if abs(found.share) < options.sound_share:
+            return None
+        if len(pairs.excess) >= options.enough_pairs:
+            break
     if len(pairs.excess) < options.min_pairs:
         return None
-    found = seen_square(pairs, options)
     size = abs(found.share)
     if not options.min_share <= size <= options.max_share:
         return None
