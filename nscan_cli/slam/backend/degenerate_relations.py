@@ -3,22 +3,22 @@
 Tracking assumes steady motion there. If the robot went faster or slower meanwhile, the way is too long or
 too short, every match fits, and nothing contradicts. The Hessian of a match there describes only the ripple
 of its energy. So the relations of such a way get variance along it: that of a random walk, whose end has the
-variance of the whole guess. All relations there repeat the same guess, and marginals count each pair of scans
-once.
+variance of the whole guess. The robot may have gone faster or slower than usual, and the farther the mapped
+way is from its usual one, the likelier the map is wrong. See guessed_ways.py for what becomes of a relation.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.calibration.driving_direction import driving_direction
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.poses import Array, Indices, Mask, path_lengths
+from nscan_cli.poses import Array, Indices, Mask, path_lengths, relative
+from nscan_cli.slam.backend.guessed_ways import GuessedWays
 from nscan_cli.slam.backend.options import DegenerateRelationOptions, DegenerateStretchOptions
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 from nscan_cli.slam.state import SlamState
@@ -35,6 +35,8 @@ class DegenerateStretch(NamedTuple):
     """Length of the stretch as mapped, m."""
     possible: float
     """Length of the stretch at the robot's usual speed, m: it may only seem to stand."""
+    ahead: float
+    """How far the robot came ahead in it as mapped, m: less than `path` where it seems to reverse."""
 
     def is_long(self, options: DegenerateStretchOptions) -> bool:
         """Whether it is long as mapped."""
@@ -53,14 +55,32 @@ def degenerate_stretches(
         return []
     along = path_lengths(poses)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
-    speed, ways = usual_speed(poses, times, weakest_sigmas <= options.sigma, options.least_speed), []
+    is_told = weakest_sigmas <= options.sigma
+    speed, ways = usual_speed(poses, times, is_told, options.least_speed), []
+    steps = np.append(0.0, np.cumsum(_steps_ahead(poses, times, is_told, options)))
     for piece in pieces:
         begin, last = max(int(piece[0]) - 1, 0), int(piece[-1])
         possible = speed * float(times[last] - times[begin])
-        way = DegenerateStretch(int(piece[0]), last, float(along[last] - along[begin]), possible)
+        path, ahead = float(along[last] - along[begin]), float(steps[last] - steps[begin])
+        way = DegenerateStretch(int(piece[0]), last, path, possible, ahead)
         if max(way.path, way.possible) >= options.path:
             ways.append(way)
     return ways
+
+
+def _steps_ahead(poses: Array, times: Array, is_told: Mask, options: DegenerateStretchOptions) -> Array:
+    """(S − 1,) how far the robot came ahead in each step along a path (S, 3), m.
+
+    Ahead is the way that it drives where the path `is_told` (S,), else all along. A robot that drives there
+    in several directions goes ahead in each step.
+    """
+    shortest = options.least_speed * float(np.median(np.diff(times)))
+    ahead = driving_direction(np.where(is_told[:, None], poses, np.nan), shortest, options.min_steps)
+    if not ahead.any():
+        ahead = driving_direction(poses, shortest, 1)
+    steps, length = relative(poses[1:], poses[:-1])[:, :2], float(np.hypot(*ahead))
+    found: Array = steps @ (ahead / length) if length > options.min_ahead else np.hypot(*steps.T)
+    return found
 
 
 def usual_speed(poses: Array, times: Array, is_told: Mask, least_speed: float) -> float:
@@ -75,22 +95,16 @@ def usual_speed(poses: Array, times: Array, is_told: Mask, least_speed: float) -
     return float(np.median(speeds[chosen])) if chosen.any() else 0.0
 
 
-Between = list[tuple[int, int]]
-"""For each two successive nodes of a relation, the first and the last step from keyframe to keyframe between
-them."""
-
-
 def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     """The pairwise and the nScan relations, as certain as scans tell the way."""
     pairwise, nscan = state.pairwise_relations, state.nscan_relations
-    variances = guess_variances(state)
+    variances, route = guess_variances(state), state.route
     if not variances.any():
         return pairwise, nscan
-    most = state.options.degenerate_relations.most_steps
+    ways = GuessedWays(route.rows, route.chain, variances, state.options.degenerate_relations)
     already = {id(relation) for relation in state.saved_relations}
-    widened = with_guess_variances(pairwise, nscan, state.route.rows, variances, most)
-    pairs = [old if id(old) in already else new for old, new in zip(pairwise, widened[0], strict=True)]
-    return pairs, [old if id(old) in already else new for old, new in zip(nscan, widened[1], strict=True)]
+    pairs = [pair if id(pair) in already else ways.widened_pair(pair) for pair in pairwise]
+    return pairs, [joint if id(joint) in already else ways.widened_joint(joint) for joint in nscan]
 
 
 def guess_variances(state: SlamState) -> Array:
@@ -105,9 +119,7 @@ def guess_variances(state: SlamState) -> Array:
     end = int(state.route.rows[-1]) + 1
     path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.weakest_sigmas))[:end]
     times, rows, options = state.log.times[:end], state.route.rows, state.options.degenerate_relations
-    found = degenerate_stretches(path, times, sigmas, options.stretch)
-    # A robot that seems to stand mostly does.
-    ways = [way for way in found if way.is_long(options.stretch)]
+    ways = degenerate_stretches(path, times, sigmas, options.stretch)
     lost = [keyframe.guess_variances for keyframe in state.route.keyframes[1 : len(rows)]]
     return np.column_stack(
         [length_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]
@@ -131,72 +143,7 @@ def length_variances(
     at = times[rows]
     for way in ways:
         begin, end = times[max(way.first - 1, 0)], times[way.last]
-        whole = options.speed_share * way.possible
+        whole = float(np.hypot(options.speed_share * way.possible, way.possible - way.ahead))
         within = np.clip(at[1:], begin, end) - np.clip(at[:-1], begin, end)
         variances += whole**2 * within / max(float(end - begin), 1e-9)
     return variances
-
-
-def with_guess_variances(
-    pairwise: Sequence[Pairwise], nscan: Sequence[NScan], rows: Indices, variances: Array, most_steps: int
-) -> tuple[list[Pairwise], list[NScan]]:
-    """The relations among keyframes in rows (K,), less certain along ways that no scan tells.
-
-    `variances` (K − 1, 3) are those from each keyframe to the next: along the way (m²), and, where scans fit
-    nothing, of place (m²) and of turn (rad²). Relations over more than `most_steps` keyframes are of another
-    visit: they measure, and stay.
-    """
-    known = [_widened_pair(pair, _steps(pair, rows, most_steps), variances) for pair in pairwise]
-    return known, [_widened_joint(joint, _steps(joint, rows, most_steps), variances) for joint in nscan]
-
-
-def _steps(relation: Pairwise | NScan, rows: Indices, most_steps: int) -> Between:
-    """The steps of the chain between successive nodes of a relation; an empty range where it is a loop."""
-    at = np.sort(np.searchsorted(rows, np.array(relation.nodes))).tolist()
-    return [(a, b if b - a <= most_steps else a) for a, b in itertools.pairwise(at)]
-
-
-def _widened_pair(pair: Pairwise, steps: Between, variances: Array) -> Pairwise:
-    ((first, last),) = steps
-    along, place, turn = variances[first:last].sum(axis=0).tolist()
-    if along + place + turn == 0.0:
-        return pair
-    direction = np.append(_direction(pair.measurement[:2], pair.measurement[2]), 0.0)
-    information = _less_certain(pair.information, direction, along)
-    for axis, variance in zip(np.eye(3), (place, place, turn), strict=True):
-        information = _less_certain(information, axis, variance)
-    return replace(pair, information=information)
-
-
-def _widened_joint(joint: NScan, steps: Between, variances: Array) -> NScan:
-    order = np.argsort(joint.nodes)
-    poses, hessian = joint.poses[order], joint.hessian
-    for after, (first, last) in enumerate(steps, start=1):
-        along, place, turn = variances[first:last].sum(axis=0).tolist()
-        if along + place + turn == 0.0:
-            continue
-        direction = _direction(poses[after, :2] - poses[after - 1, :2], poses[after, 2])
-        # The scans behind the step move along it together, or turn about its end.
-        off = poses[after:, :2] - poses[after, :2]
-        for motion, variance in (
-            (np.append(direction, 0.0), along),
-            (np.array([1.0, 0.0, 0.0]), place),
-            (np.array([0.0, 1.0, 0.0]), place),
-            (np.column_stack([-off[:, 1], off[:, 0], np.ones(len(off))]), turn),
-        ):
-            motions = np.zeros((len(order), 3))
-            motions[order[after:]] = motion
-            hessian = _less_certain(hessian, motions.ravel(), variance)
-    return joint if hessian is joint.hessian else replace(joint, hessian=hessian)
-
-
-def _direction(step: Array, heading: float) -> Array:
-    """The unit vector (2,) along a step (2,), or along a heading (rad) if it is of no length."""
-    length = float(np.hypot(*step))
-    return step / length if length > 1e-3 else np.array([np.cos(heading), np.sin(heading)])
-
-
-def _less_certain(information: Array, motion: Array, variance: float) -> Array:
-    """Information (n, n) with a variance added along a motion (n,): Sherman and Morrison's formula."""
-    row = information @ motion
-    return information - np.outer(row, row) * (variance / (1.0 + variance * float(motion @ row)))

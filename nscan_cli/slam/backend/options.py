@@ -157,6 +157,12 @@ class DegenerateStretchOptions:
     ways."""
     least_speed: float = 0.05
     """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
+    min_steps: int = 5
+    """Least number of steps elsewhere that tell which way the robot drives. With a larger number its mapped
+    steps in such ways tell it more often."""
+    min_ahead: float = 0.8
+    """Least length of the mean direction of these steps: a robot that drives in several directions has none.
+    With a larger value more robots count as such."""
 
 
 @dataclass(frozen=True)
@@ -171,3 +177,14 @@ class DegenerateRelationOptions:
     most_steps: int = 3
     """Largest number of keyframes between two nodes of a relation of one visit. Relations between visits are
     measured, and stay as certain. A larger value makes more relations less certain."""
+    revisit_factor: float = 100.0
+    """Relations of scans within such a way with another visit measure nothing along it: their variance is
+    that of the guess in between, by this factor. With a smaller factor they hold the guess, and all together
+    make it certain."""
+    direction_length: float = 0.5
+    """A step between keyframes that is at least as long has the direction between them, m; on a shorter one
+    the robot drives where it looks. A larger value believes headings more often."""
+    direction_sigma: float = 0.005
+    """Standard deviation of the direction of such a way as a relation has it, rad. Matches of bare walls
+    differ by a milliradian. A larger value makes the place across less certain; a smaller one lets relations
+    whose directions differ fix the length."""
