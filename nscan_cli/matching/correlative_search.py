@@ -111,7 +111,9 @@ class Search:
         cells = _point_cells(field, chosen, centre, angles)
         self._centre = centre
         self._lattice = field, cells, centre, angles, steps
-        self._tile_bounds = _tile_bounds(field.coarsest, cells, steps) / cells.shape[1]
+        sums, count = _tile_bounds(field.coarsest, cells, steps).astype(np.float64), cells.shape[1]
+        # Rounding may take so much from the mean of numbers up to 1.
+        self._tile_bounds = sums / count + count * float(np.finfo(np.float32).eps)
 
     def best(self, least: float, without: tuple[Array, float] | None = None) -> FoundPose | None:
         """The best pose that scores more than `least`; None if there is none.
@@ -187,12 +189,13 @@ def _point_cells(field: LikelihoodField, points: Array, centre: Array, angles: A
 
 
 @kernel
-def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach: int) -> Array:
+def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach: int) -> NDArray[np.float32]:
     """(a, t, t) upper bounds of the field's sums in squares of PAD × PAD shifts, from −`reach` cells on."""
     tiles = (2 * reach) // PAD + 1
     lanes = -(-tiles // LANES)
     width, height = coarsest.shape[1], coarsest.shape[2]
-    bounds = np.zeros((cells.shape[0], tiles, lanes * LANES))
+    # In single precision twice as many numbers are summed at once.
+    bounds = np.zeros((cells.shape[0], tiles, lanes * LANES), dtype=np.float32)
     for a in range(cells.shape[0]):
         for k in range(cells.shape[1]):
             ix, iy = cells[a, k, 0] - reach, cells[a, k, 1] - reach
