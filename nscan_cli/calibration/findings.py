@@ -201,10 +201,7 @@ def wrong_turns(turns: TurnFit) -> Finding:
 def wrong_scale(
     fit: MountFit, ranges_likelier: float, reading: ReadingOptions, options: FileCheckOptions
 ) -> Finding:
-    """Odometry counts in another unit than the ranges, beyond doubt or likely.
-
-    The ranges are so many times as likely to be wrong as odometry.
-    """
+    """Odometry counts in another unit than ranges, which are so many times as likely as it to be wrong."""
     decimal = 10.0 ** round(math.log10(fit.scale))
     is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
     scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
