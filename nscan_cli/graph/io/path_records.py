@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from nscan_cli.files.limits import DISTANCE, TIME
-from nscan_cli.graph.io.json_fields import MalformedError, bounded_numbers, pose_rows
+from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, bounded_numbers, pose_rows
 
 if TYPE_CHECKING:
-    from nscan_cli.graph.io.json_fields import JsonRecord
     from nscan_cli.logs.robot_path import RobotPath
 
 
@@ -23,8 +24,6 @@ def path_of_records(document: JsonRecord) -> RobotPath | None:
     """The path of a document; None if it has none. Raises MalformedError."""
     if "path" not in document:
         return None
-    import numpy as np
-
     from nscan_cli.logs.robot_path import robot_path
 
     values = document.get("path")
