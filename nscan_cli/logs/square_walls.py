@@ -247,29 +247,40 @@ def seen_square(pairs: WallPairs, options: SquareWallOptions) -> SeenSquare:
         off = left - shares[:, np.newaxis] * some.by_share
         counts[:, column] = np.exp(precise * off * off).sum(axis=1)
     row, best = divmod(int(counts.argmax()), len(lengths))
-    share, length = _settled(pairs, float(shares[row]), float(lengths[best]), options, is_free=True)
+    share, length = settled(pairs, float(shares[row]), float(lengths[best]), options)
     start = float(lengths[counts[len(shares) // 2].argmax()])
-    _none, other = _settled(pairs, 0.0, start, options, is_free=False)
-    gain = _count(pairs, share, length) / max(_count(pairs, 0.0, other), 1e-9)
+    _none, other = settled(pairs, 0.0, start, options, are_free=(False, True))
+    gain = count_square(pairs, share, length) / max(count_square(pairs, 0.0, other), 1e-9)
     return SeenSquare(share, length, gain)
 
 
-def _count(pairs: WallPairs, share: float, length: float) -> float:
+def count_square(pairs: WallPairs, share: float, length: float) -> float:
     """How many pairs are square."""
     off = pairs.excess - share * pairs.by_share - length * pairs.by_length
     return float(np.exp(-0.5 * off * off / pairs.variance).sum())
 
 
-def _settled(
-    pairs: WallPairs, share: float, length: float, options: SquareWallOptions, is_free: bool
+def normal_equations(
+    pairs: WallPairs, share: float, length: float, are_free: tuple[bool, bool] = (True, True)
+) -> tuple[Array, Array]:
+    """The matrix (2, 2) and the right side (2,) of a round of weighted least squares for the changes of share
+    and length (m); what is not free stays as it is."""
+    columns = np.column_stack([pairs.by_share, pairs.by_length]) * are_free
+    off = pairs.excess - share * pairs.by_share - length * pairs.by_length
+    weights = np.exp(-0.5 * off * off / pairs.variance) / pairs.variance
+    matrix: Array = columns.T @ (weights[:, np.newaxis] * columns) + 1e-9 * np.eye(2)
+    return matrix, columns.T @ (weights * off)
+
+
+def settled(
+    pairs: WallPairs,
+    share: float,
+    length: float,
+    options: SquareWallOptions,
+    are_free: tuple[bool, bool] = (True, True),
 ) -> tuple[float, float]:
-    """The share and the length at which so many rounds of weighted least squares arrive; the share stays as
-    it is unless it is free."""
-    columns = np.column_stack([pairs.by_share * is_free, pairs.by_length])
+    """The share and the length (m) at which so many rounds arrive."""
     for _ in range(options.rounds):
-        off = pairs.excess - share * pairs.by_share - length * pairs.by_length
-        weights = np.exp(-0.5 * off * off / pairs.variance) / pairs.variance
-        normal = columns.T @ (weights[:, np.newaxis] * columns)
-        change = np.linalg.solve(normal + 1e-9 * np.eye(2), columns.T @ (weights * off))
+        change = np.linalg.solve(*normal_equations(pairs, share, length, are_free))
         share, length = share + float(change[0]), length + float(change[1])
     return share, length

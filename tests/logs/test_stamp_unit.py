@@ -32,6 +32,15 @@ def test_stamps_since_1970_tell_their_unit_however_uneven(unit):
 
 
 @pytest.mark.parametrize("unit", UNITS_OF_TIME)
+@pytest.mark.parametrize("start", [100.0, 2e3, 1e6, 1.7e9])
+def test_a_clock_that_began_at_any_time(unit, start):
+    """2,000 s in nanoseconds were taken for milliseconds since 1970."""
+    times = drive() - 1.7e9 + start
+    assert stamp_unit(times / unit.seconds) == unit
+    assert stamp_unit(times) is None
+
+
+@pytest.mark.parametrize("unit", UNITS_OF_TIME)
 def test_stamps_are_converted_and_it_is_said(unit):
     times = drive()
     order = by_time([f"{time / unit.seconds:.0f}" for time in times])
