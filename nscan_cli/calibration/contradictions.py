@@ -120,10 +120,14 @@ def _unusable(
     evidence: StepEvidence, turns: TurnFit | None, reading: ReadingOptions, options: FileCheckOptions
 ) -> Finding | None:
     """Why odometry cannot be used at all; None if it can."""
-    is_explained = explains_positions(evidence.fit, options) or explains_positions(
-        evidence.mirrored_fit, options
+    fits = (evidence.fit, evidence.mirrored_fit)
+    least = min(
+        (fit.tail for fit in fits if fit is not None and explains_positions(fit, options)), default=np.inf
     )
-    if not is_explained and explains_positions(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
+    other = evidence.fit_with_signs(ONE_AXIS_REVERSED)
+    # Where the robot mostly drives along one axis, a laser that looks elsewhere explains most steps as well.
+    is_better = other is not None and other.tail < options.max_sign_tail * least
+    if is_better and explains_positions(other, options):
         is_heading = turns is not None and turns.ratio < 0.0
         return findings.wrong_signs(evidence, "headings" if is_heading else "x or y", reading)
     excluded = is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options)

@@ -11,6 +11,7 @@ from nscan_cli.calibration.changed_odometry import (
     with_scaled_odometry,
     with_seen_mount,
 )
+from nscan_cli.calibration.clock_changes import checked_clock_change
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.contradictions import changed_view, find_contradictions
@@ -139,13 +140,17 @@ def _compared(
     """Compare a log; `known` are the steps that its scans have measured already, others are added."""
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
     findings, stretched = find_contradictions(signed, reading, options, known), list[str]()
+    log, set_anew = checked_clock_change(log, known, options)
+    if set_anew:
+        signed, reversing = checked_signs(log, options.unsigned, options.steps)
+        findings = find_contradictions(signed, reading, options, known)
     if not any(finding.is_of_clocks for finding in findings):
         log, stretched = checked_stretches(log, options, known)
     log, reading, late = checked_delay(log, reading, known, options)
     if late or stretched:
         signed, reversing = checked_signs(log, options.unsigned, options.steps)
         findings = find_contradictions(signed, reading, options, known)
-    return _Compared(log, reading, signed, known, findings, stretched, reversing, late)
+    return _Compared(log, reading, signed, known, findings, stretched, reversing, set_anew + late)
 
 
 def _mirrored(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:

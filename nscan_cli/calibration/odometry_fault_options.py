@@ -27,6 +27,43 @@ class UnsteadyStampOptions:
 
 
 @dataclass(frozen=True)
+class ClockChangeOptions:
+    """When odometry is late or early in a part of the log, and not in the rest."""
+
+    longest: float = 12.0
+    """Largest offset of the stamps that is tried, s. A larger value takes longer."""
+    step: float = 0.05
+    """Interval between the offsets that are tried, s. A smaller value takes longer."""
+    min_turn: float = 0.05
+    """Least turn of a step that counts, rad. With a larger value fewer steps count, and each tells more."""
+    min_turns: int = 6
+    """Least number of steps with a turn on both sides. A larger value finds less near the ends of a log."""
+    first_turns: int = 4
+    """Least number of these among the first few steps. A larger value takes less time, and finds less where
+    robots seldom turn."""
+    max_difference: float = 0.1
+    """Turns of a step that differ by more count as different by this, rad. A larger value gives slips and
+    failed matches more weight."""
+    least: float = 0.3
+    """Least difference of the offsets of both sides, s. It is 0.1 on real logs. A larger value finds less."""
+    max_left: float = 0.75
+    """Largest disagreement of the turns of a side with its offset, as a share of the turns by scans. A larger
+    value finds more, also by chance."""
+    max_gain: float = 0.85
+    """A side disagrees with its own offset by at most this share of its disagreement with that of the other.
+    A larger value finds more, also by chance."""
+    first_sigmas: float = 1.3
+    """More steps are measured where the first few gain so much on both sides, in standard deviations. A
+    larger value takes less time, and finds less."""
+    sigmas: float = 3.0
+    """Least mean gain of the turns of either side with its own offset, in its standard deviations. A larger
+    value finds less."""
+    fitted: int = 3
+    """Number of offsets on each side of the best one that a parabola fits. With more the curve is less like a
+    parabola."""
+
+
+@dataclass(frozen=True)
 class ReversedHeadingOptions:
     """When the headings by odometry count the wrong way, and its positions do not."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.odometry_fault_options import (
+    ClockChangeOptions,
     ReversedHeadingOptions,
     ScaledStretchOptions,
     UnsteadyStampOptions,
@@ -92,6 +93,8 @@ class FileCheckOptions:
     """How the offset between the clocks of odometry and scans is looked for."""
     lag: DelayOptions = field(default_factory=DelayOptions)
     """When odometry is late or early, by the steps of any laser."""
+    clock_change: ClockChangeOptions = field(default_factory=ClockChangeOptions)
+    """When odometry is late or early in a part of the log alone."""
     unsteady: UnsteadyStampOptions = field(default_factory=UnsteadyStampOptions)
     """When odometry fits the scans at no offset of its stamps."""
     headings: ReversedHeadingOptions = field(default_factory=ReversedHeadingOptions)
@@ -141,6 +144,9 @@ class FileCheckOptions:
     max_tail: float = 0.4
     """A finding explains the steps if the upper quartile of the residuals is at most this share of their
     motion. A larger value accepts poorer explanations."""
+    max_sign_tail: float = 0.4
+    """Odometry counts x or y the wrong way if with the other sign this quartile is less than this share of
+    what it is as recorded, however well that explains the steps. A larger value finds more."""
     min_mount_turn: float = 0.06
     """Least error of the laser's direction in the file that a warning names, rad. It is 0.04 at most on real
     logs, with a standard deviation of 0.02. A larger value warns less."""

@@ -17,6 +17,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import bare_corridor
 from tests.slam.keyframe_drives import round_scene
@@ -295,3 +296,12 @@ def test_a_bare_corridor_tells_nothing():
 def test_a_robot_that_stands_contradicts_nothing():
     log = faults.taken(drive(), np.zeros(100, dtype=np.int64))
     assert found(log) == []
+
+
+def test_a_wrong_sign_where_the_robot_mostly_drives_along_one_axis():
+    """A laser that looks aside explained three quarters of the steps, and nothing was said."""
+    log = excerpt(read_log(str(data_file("intel.log.gz"))), slice(6000, 9000))
+    assert log.odometry is not None
+    assert found(log) == []
+    for wrong in (log.odometry * (1, -1, 1), log.odometry[:, [1, 0, 2]]):
+        assert any("counts x or y the wrong way" in said for said in found(replace(log, odometry=wrong)))

@@ -1,0 +1,159 @@
+"""A place in a log behind which odometry is late or early, and not before: one of two clocks was set there.
+
+Over the whole log turns then fit at no offset, or at that of the longer part. odometry_delay.py and
+clock_offset.py look for one offset of all stamps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.parabola import parabola_minimum
+from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.calibration.turn_differences import turn_differences
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
+from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import Array, are_known
+
+
+class ClockChange(NamedTuple):
+    """The place that tells best, and the offsets of odometry's stamps with which turns fit on both sides."""
+
+    time: float
+    """The place, s."""
+    before: float
+    """s to add to the stamps of odometry before it."""
+    behind: float
+    """And behind it, s."""
+    sigmas: float
+    """Mean gain of the turns with the offset of their own side, in its standard deviations, of the side where
+    it is less."""
+    left: float
+    """Sum of the differences of turns with it, as a share of the turns by scans, of the side where it is
+    more; each is capped."""
+    gain: float
+    """This sum as a share of that with the offset of the other side, of the side where it is more."""
+
+    def is_clear(self, sigmas: float, options: ClockChangeOptions) -> bool:
+        """Whether both sides tell their own offset, by so many standard deviations."""
+        is_told = self.left <= options.max_left and self.gain <= options.max_gain and self.sigmas >= sigmas
+        return is_told and abs(self.behind - self.before) >= options.least
+
+
+def checked_clock_change(
+    log: LaserLog, known: KnownSteps, options: FileCheckOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log with its odometry on one clock, and messages.
+
+    More steps are measured only if those that are `known` show a change; they are added.
+    """
+    if log.odometry is None:
+        return log, []
+    change = clock_change(log, known, options.clock_change, options.clock_change.first_turns)
+    if change is None or not change.is_clear(options.clock_change.first_sigmas, options.clock_change):
+        return log, []
+    rows = telling_steps(log, options.steps, options.more_steps)
+    measure_steps(log, rows, options.steps, known=known)
+    change = clock_change(log, known, options.clock_change, options.clock_change.min_turns)
+    if change is None or not change.is_clear(options.clock_change.sigmas, options.clock_change):
+        return log, []
+    by = change.behind - change.before
+    # The side that is farther off was set wrongly.
+    is_behind = abs(change.behind) > abs(change.before)
+    from_here = int(log.numbers[np.searchsorted(log.times, change.time)])
+    side = "early" if (by > 0.0) == is_behind else "late"
+    where = f"from about scan {from_here} on" if is_behind else f"up to about scan {from_here}"
+    said = (
+        f"odometry is stamped {abs(by):.2g} s too {side} {where}, against the rest, by the turns of the "
+        "scans: a clock was set there; these stamps are moved; --as-recorded believes the file"
+    )
+    return with_moved_part(log, change.time, by if is_behind else -by, is_behind), [said]
+
+
+def clock_change(
+    log: LaserLog, known: KnownSteps, options: ClockChangeOptions, least: int
+) -> ClockChange | None:
+    """The place at which two offsets explain the turns of known steps best; None for fewer turns than `least`
+    on both sides, of which there are more where more turns are known."""
+    assert log.odometry is not None
+    at, headings = log.times, log.odometry[:, 2]
+    if log.odometry_path is not None:
+        at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
+    is_known = np.isfinite(headings)
+    steps = sorted((*pair, float(step[0][2])) for pair, step in known.items() if step is not None)
+    first, last, turned = np.array(steps).reshape(-1, 3)[[abs(s[2]) >= options.min_turn for s in steps]].T
+    least = max(least, min(options.min_turns, len(turned) // 3))
+    if len(turned) < 2 * least or np.count_nonzero(is_known) < 2:
+        return None
+    begins, ends = (log.middle_times[rows.astype(np.int64)] for rows in (first, last))
+    count = round(options.longest / options.step)
+    offsets = options.step * np.arange(-count, count + 1, dtype=np.float64)
+    path = at[is_known], np.unwrap(headings[is_known])
+    off = np.minimum(turn_differences(path, (begins, ends), turned, offsets), options.max_difference)
+    sums = np.cumsum(off, axis=1)
+    before, both = sums[:, least - 1 : len(turned) - least], sums[:, -1:]
+    k = int(np.argmin(before.min(axis=0) + (both - before).min(axis=0))) + least
+    whole = np.minimum(np.abs(turned), options.max_difference)
+    sides = (off[:, :k], whole[:k]), (off[:, k:], whole[k:])
+    totals = [side.mean(axis=1) for side, _ in sides]
+    best = [int(total.argmin()) for total in totals]
+    if any(place in (0, 2 * count) for place in best):
+        return None
+    told = [
+        _TurnsOfSide.of(side[own], side[other], turns)
+        for (side, turns), own, other in zip(sides, best, best[::-1], strict=True)
+    ]
+    at_place = 0.5 * float(ends[k - 1] + begins[k])
+    before_it, behind_it = (parabola_minimum(offsets, total, options.fitted) for total in totals)
+    sigmas, lefts, gains = zip(*told, strict=True)
+    return ClockChange(at_place, before_it, behind_it, min(sigmas), max(lefts), max(gains))
+
+
+class _TurnsOfSide(NamedTuple):
+    """How the turns of one side fit with its own offset; as in ClockChange."""
+
+    sigmas: float
+    left: float
+    gain: float
+
+    @classmethod
+    def of(cls, own: Array, other: Array, turns: Array) -> _TurnsOfSide:
+        """From the differences (n,) with its offset and with the other side's, and the turns (n,), rad."""
+        more = other - own
+        sigma = max(float(more.std(ddof=1)), 1e-9) / len(more) ** 0.5
+        off = float(own.sum())
+        return cls(float(more.mean()) / sigma, off / float(turns.sum()), off / max(float(other.sum()), 1e-9))
+
+
+def with_moved_part(log: LaserLog, time: float, by: float, is_behind: bool) -> LaserLog:
+    """The log with `by` (s) added to the stamps of its odometry behind a time (s), or before it.
+
+    Of poses that come to lie beside those of the other part, the later ones are left out.
+    """
+    if log.odometry is None:
+        return log
+
+    def moved(times: Array) -> tuple[Array, Array]:
+        """The times (n,) of n poses, moved, and which are used."""
+        there = times + np.where((times > time) == is_behind, by, 0.0)
+        latest = np.maximum.accumulate(there)
+        return there, np.append(True, there[1:] > latest[:-1])
+
+    path = log.odometry_path
+    if path is None:
+        known = np.flatnonzero(are_known(log.odometry))
+        at, used = moved(log.times[known])
+        poses = log.odometry[known[used]]
+        return replace(log, odometry=interpolated_poses(log.times, at[used], poses, "pose", []))
+    at, used = moved(path.times)
+    path = robot_path(at[used], path.poses[used])
+    if path is None:
+        return log
+    return replace(log, odometry=moved_odometry(log.odometry, path, log.times), odometry_path=path)

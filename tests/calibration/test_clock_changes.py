@@ -1,0 +1,96 @@
+"""A place in a log behind which odometry is stamped by a clock that was set."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nscan_cli.calibration.clock_changes import ClockChange, with_moved_part
+from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_path import robot_path
+from tests.calibration.test_file_check import drive
+from tests.data import data_file
+from tests.simulation import odometry_faults
+
+
+def set_in(log: LaserLog, seconds: float, begin: float, end: float) -> LaserLog:
+    """Odometry is late by so much from one share of the log to another."""
+    assert log.odometry is not None
+    late = odometry_faults.late(log, seconds).odometry
+    assert late is not None
+    rows = np.arange(len(log))
+    inside = (rows >= begin * len(log)) & (rows < end * len(log))
+    return replace(log, odometry=np.where(inside[:, None], late, log.odometry))
+
+
+def told(log: LaserLog) -> tuple[LaserLog, list[str]]:
+    found = checked_file(log, ReadingOptions(), FileCheckOptions())
+    return found.log, [said for said in found.messages if "a clock was set there" in said]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "begin", "end", "what"),
+    [
+        (1.0, 0.5, 1.0, r"stamped (1|0\.9\d|1\.0\d|1\.1) s too late from about scan"),
+        (-0.6, 0.4, 1.0, r"stamped 0\.(5|6)\d? s too early from about scan"),
+        (2.0, 0.0, 0.4, r"stamped (2|1\.9|2\.1) s too late up to about scan"),
+    ],
+)
+def test_the_part_is_named_and_put_right(seconds, begin, end, what):
+    log, (said,) = told(set_in(drive(), seconds, begin, end))
+    assert re.search(what, said)
+    true = drive().odometry
+    assert true is not None
+    assert log.odometry is not None
+    known = np.isfinite(log.odometry[:, 0])
+    off = np.abs(log.odometry - true)[known]
+    assert known.mean() > 0.9
+    assert np.quantile(off, 0.9) < 0.06
+
+
+def test_an_offset_of_all_stamps_is_none():
+    assert told(drive())[1] == []
+    assert told(odometry_faults.late(drive(), 1.0))[1] == []
+    assert told(odometry_faults.late(drive(), 5.0))[1] == []
+
+
+def test_odometry_with_times_of_its_own_is_moved_as_well():
+    log = drive()
+    assert log.odometry is not None
+    path = robot_path(log.times, log.odometry)
+    middle = float(log.times[len(log) // 2])
+    assert path is not None
+    moved = with_moved_part(replace(log, odometry_path=path), middle, 0.7, True)
+    assert moved.odometry_path is not None
+    assert moved.odometry_path.times[-1] == pytest.approx(log.times[-1] + 0.7)
+    assert moved.odometry_path.times[0] == log.times[0]
+    back = with_moved_part(moved, middle, -0.7, True)
+    assert back.odometry_path is not None
+    assert np.all(np.diff(back.odometry_path.times) > 0.0)
+
+
+def test_both_sides_must_tell_it():
+    clear = ClockChange(10.0, 0.0, 1.0, 5.0, 0.2, 0.3)
+    options = ClockChangeOptions()
+    assert clear.is_clear(options.sigmas, options)
+    for change in ({"behind": 0.2}, {"sigmas": 1.0}, {"left": 0.8}, {"gain": 0.95}):
+        assert not clear._replace(**change).is_clear(options.sigmas, options)
+
+
+@pytest.mark.parametrize("seconds", [-0.6, 1.0, 3.0])
+@pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel"])
+def test_real_drives(name, seconds):
+    log = read_log(str(data_file(f"{name}.log.gz")))
+    assert told(log)[1] == []
+    (said,) = told(set_in(log, seconds, 0.5, 1.0))[1]
+    assert f"too {'late' if seconds > 0 else 'early'} from about scan" in said
+    (scan,) = map(int, re.findall(r"scan (\d+)", said))
+    assert abs(scan - len(log) // 2) < 0.1 * len(log)
