@@ -14,6 +14,8 @@ from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, meas
 from nscan_cli.calibration.mount_fit import TurnFit
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.position_findings import of_opposite_turns, of_positions
+from nscan_cli.calibration.robust_fit import TO_SIGMA
+from nscan_cli.calibration.scale_change import SIGMA_OF_MEDIAN
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
     are_of_one_size,
@@ -82,7 +84,7 @@ def find_contradictions(
     found = []
     if turns is not None and not turns_agree(turns, options):
         never_turns = bool(is_still[2]) and turns.steps >= options.min_turns_unmeasured
-        if never_turns or _are_told(turns, options):
+        if never_turns or _are_told(turns, options) or _is_of_other_size(turns, options):
             found.append(findings.wrong_turns(turns))
     return found + of_positions(log.mount, fit, evidence, reading, options)
 
@@ -106,6 +108,14 @@ def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> St
 
 def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
     return turns.steps >= options.min_steps and turns.spread <= options.max_spread
+
+
+def _is_of_other_size(turns: TurnFit, options: FileCheckOptions) -> bool:
+    """Whether turns are too large or too small in the mean, however much they vary: outdoors scans tell
+    single ones badly, and some robots slip."""
+    sigma = SIGMA_OF_MEDIAN * TO_SIGMA * turns.spread / turns.steps**0.5
+    off = abs(abs(turns.ratio) - 1.0) - options.max_turn_error
+    return turns.steps >= options.min_steps and off > options.turn_sigmas * sigma
 
 
 def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOptions) -> bool:

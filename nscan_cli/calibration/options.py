@@ -195,6 +195,9 @@ class FileCheckOptions:
     odometry more often."""
     max_turn_error: float = 0.3
     """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
+    turn_sigmas: float = 3.0
+    """Where single turns differ by much, their mean must be off by more than that by so many standard
+    deviations. A larger value warns less."""
     min_opposite_share: float = 0.8
     """Odometry turns the other way if its turns are opposite to those by scans in this share of the steps,
     however much their sizes vary. A larger value finds less."""

@@ -116,11 +116,15 @@ class UnitByOdometry(NamedTuple):
     @property
     def correction(self) -> str:
         """The message if the unit is put right."""
+        other = ""
+        if self.name == "feet":
+            # Odometry that someone converted twice is off by such a factor, too.
+            other = "; if odometry is too short instead, and so the map, --range-scale 1"
         return (
             f"the ranges are in {self.name}: then odometry explains how they change, in "
             f"{self.evidence.share:.0%} of {counted(self.evidence.pairs, 'pair')} of scans: they are "
             f"multiplied by {self.scale:g}; --as-recorded leaves them as they are, --range-scale sets "
-            "another factor"
+            f"another factor{other}"
         )
 
 

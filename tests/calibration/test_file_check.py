@@ -305,3 +305,10 @@ def test_a_wrong_sign_where_the_robot_mostly_drives_along_one_axis():
     assert found(log) == []
     for wrong in (log.odometry * (1, -1, 1), log.odometry[:, [1, 0, 2]]):
         assert any("counts x or y the wrong way" in said for said in found(replace(log, odometry=wrong)))
+
+
+def test_turns_that_are_wrong_in_the_mean_where_scans_tell_single_ones_badly():
+    log = excerpt(read_log(str(data_file("fr-campus.log.gz"))), slice(0, 1000))
+    assert found(log) == []
+    (said,) = found(odometry_faults.turning(log, 2.0))
+    assert re.match(r"odometry likely turns wrongly: turns by odometry are 2\.\d+ times", said)

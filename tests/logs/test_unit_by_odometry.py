@@ -82,3 +82,14 @@ def test_units_of_real_logs(tmp_path: Path, name: str, unit: str, scale: float):
     assert log.range_scale == 1.0
     (said,) = contradictions(in_file(log, tmp_path, scale))
     assert f"the ranges are in {unit}: " in said
+
+
+def test_the_option_for_odometry_that_is_too_short_by_a_foot_is_named(office, tmp_path):
+    """Outdoors, where ranges are long, odometry that was converted twice looks like ranges in feet."""
+    for unit, is_named in ((0.3048, True), (0.0254, False)):
+        (said,) = (
+            said
+            for said in read_log(str(in_file(office, tmp_path, unit))).report.contradictions
+            if "then odometry explains" in said
+        )
+        assert ("odometry is too short instead, and so the map, --range-scale 1" in said) == is_named
