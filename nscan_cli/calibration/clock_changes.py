@@ -67,7 +67,8 @@ def checked_clock_change(
     by = change.behind - change.before
     # The side that is farther off was set wrongly.
     is_behind = abs(change.behind) > abs(change.before)
-    from_here = int(log.numbers[np.searchsorted(log.times, change.time)])
+    # Where a laser turns, the middle of its last scan is behind all stamps.
+    from_here = int(log.numbers[min(int(np.searchsorted(log.times, change.time)), len(log) - 1)])
     side = "early" if (by > 0.0) == is_behind else "late"
     where = f"from about scan {from_here} on" if is_behind else f"up to about scan {from_here}"
     said = (
