@@ -20,7 +20,7 @@ from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, are_known
+from nscan_cli.poses import Array, Mask, are_known
 
 
 class ClockChange(NamedTuple):
@@ -28,6 +28,8 @@ class ClockChange(NamedTuple):
 
     time: float
     """The place, s."""
+    unsure: tuple[float, float]
+    """It may be from the one time to the other, s."""
     before: float
     """s to add to the stamps of odometry before it."""
     behind: float
@@ -75,7 +77,8 @@ def checked_clock_change(
         f"odometry is stamped {abs(by):.2g} s too {side} {where}, against the rest, by the turns of the "
         "scans: a clock was set there; these stamps are moved; --as-recorded believes the file"
     )
-    return with_moved_part(log, change.time, by if is_behind else -by, is_behind), [said]
+    moved = with_moved_part(log, change.time, by if is_behind else -by, is_behind, change.unsure)
+    return moved, [said]
 
 
 def clock_change(
@@ -114,7 +117,12 @@ def clock_change(
     at_place = 0.5 * float(ends[k - 1] + begins[k])
     before_it, behind_it = (parabola_minimum(offsets, total, options.fitted) for total in totals)
     sigmas, lefts, gains = zip(*told, strict=True)
-    return ClockChange(at_place, before_it, behind_it, min(sigmas), max(lefts), max(gains))
+    beside, most = options.unsure_turns, options.longest_unsure
+    unsure = (
+        max(float(ends[max(k - 1 - beside, 0)]), at_place - most),
+        min(float(begins[min(k + beside, len(begins) - 1)]), at_place + most),
+    )
+    return ClockChange(at_place, unsure, before_it, behind_it, min(sigmas), max(lefts), max(gains))
 
 
 class _TurnsOfSide(NamedTuple):
@@ -133,19 +141,25 @@ class _TurnsOfSide(NamedTuple):
         return cls(float(more.mean()) / sigma, off / float(turns.sum()), off / max(float(other.sum()), 1e-9))
 
 
-def with_moved_part(log: LaserLog, time: float, by: float, is_behind: bool) -> LaserLog:
+def with_moved_part(
+    log: LaserLog, time: float, by: float, is_behind: bool, unsure: tuple[float, float] = (0.0, 0.0)
+) -> LaserLog:
     """The log with `by` (s) added to the stamps of its odometry behind a time (s), or before it.
+
+    From a time to another where it is `unsure` which it is, poses are left out: some would be far off.
 
     Of poses that come to lie beside those of the other part, the later ones are left out.
     """
     if log.odometry is None:
         return log
 
-    def moved(times: Array) -> tuple[Array, Array]:
+    def moved(times: Array) -> tuple[Array, Mask]:
         """The times (n,) of n poses, moved, and which are used."""
         there = times + np.where((times > time) == is_behind, by, 0.0)
         latest = np.maximum.accumulate(there)
-        return there, np.append(True, there[1:] > latest[:-1])
+        is_sure = (times <= unsure[0]) | (times >= unsure[1])
+        is_later: Mask = np.append(True, there[1:] > latest[:-1])
+        return there, is_later & is_sure
 
     path = log.odometry_path
     if path is None:

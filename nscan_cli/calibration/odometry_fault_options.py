@@ -38,6 +38,12 @@ class ClockChangeOptions:
     """Least turn of a step that counts, rad. With a larger value fewer steps count, and each tells more."""
     min_turns: int = 6
     """Least number of steps with a turn on both sides. A larger value finds less near the ends of a log."""
+    unsure_turns: int = 2
+    """Between so many steps with a turn before the place and behind it odometry is left out. A larger value
+    leaves out more, and a smaller one keeps poses on the wrong side."""
+    longest_unsure: float = 3.0
+    """But only so long before the place, and behind it, s: robots that seldom turn need it. A larger value
+    leaves out more."""
     first_turns: int = 4
     """Least number of these among the first few steps. A larger value takes less time, and finds less where
     robots seldom turn."""
