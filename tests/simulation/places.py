@@ -122,10 +122,12 @@ def grounds(seed: int) -> Place:
     )
 
 
-def drive_through(place: Place, laser: Laser, how: Drive, errors: Odometry, seed: int) -> Recording:
-    """What a robot records on its way."""
+def drive_through(
+    place: Place, laser: Laser, how: Drive, errors: Odometry, seed: int, path: Array | None = None
+) -> Recording:
+    """What a robot records on its way, or along another `path` (S, 3)."""
     rng = np.random.Generator(np.random.PCG64(seed))
-    truth = poses(place.waypoints, how)
+    truth = poses(place.waypoints, how) if path is None else path
     origins = np.ascontiguousarray(compose(truth, np.array(laser.mount)))
     ranges, incidence = follow(cells_of(place.world), origins, laser.angles(), laser.max_range)
     if place.pitch:

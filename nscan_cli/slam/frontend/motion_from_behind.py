@@ -20,12 +20,29 @@ from nscan_cli.slam.frontend.tracker import Tracker
 
 
 class MotionFromBehind(NamedTuple):
-    """How the robot moved where the track from behind fits better."""
+    """How the robot moved where the track from behind fits better, or as well."""
 
     poses: Array
     """(n, 3); nan elsewhere."""
     weakest_sigmas: Array
     """(n,) standard deviation of the positions that the scans measure, m; 0 elsewhere."""
+    unproven: list[tuple[int, int]]
+    """Stretches (first, end) where it fits only as well: whether it is better is yet to be seen."""
+
+    def where_proven(self, front: Array, along: Array, least: float) -> MotionFromBehind | None:
+        """It without unproven stretches that lower the objective by less than `least`; None if none stays.
+
+        `front` (n,) are the values of the objective as scans were tracked from the front, `along` (n,) those
+        along this motion. They are compared in the stretch and in as many scans after it, which do not fit
+        the map of a wrong one.
+        """
+        motion = MotionFromBehind(self.poses.copy(), self.weakest_sigmas.copy(), [])
+        for first, end in self.unproven:
+            compared = slice(first, end + (end - first))
+            if float((front[compared] - along[compared]).sum()) < least:
+                motion.poses[_with_ends(first, end)] = np.nan
+                motion.weakest_sigmas[_with_ends(first, end)] = 0.0
+        return motion if np.isfinite(motion.poses).any() else None
 
 
 def motion_from_behind(
@@ -33,12 +50,13 @@ def motion_from_behind(
 ) -> MotionFromBehind | None:
     """The motion of scans (n) as `tracker`, a new one, finds it from the last to the first.
 
-    It is known in stretches where the robot, as it was `found`, seems to stand, and where scans from behind
-    fit clearly better, with a longer way. None without such stretches. The scans stay as they are.
+    It is known in stretches where the robot, as it was `found`, seems to stand or to slow down, and where its
+    way from behind is longer, and scans fit clearly better, or at least as well. None without such
+    stretches. The scans stay as they are.
     """
     doubtful, count = _doubtful_stretches(found, options), len(found.values)
     parts = [_standing_part(found.poses, each, range(each[1] + 1, count), options) for each in doubtful]
-    stretches = [part for part in parts if part is not None and _may_fit_better(found, part, options)]
+    stretches = [part for part in parts if part is not None and _may_fit(found, part, options)]
     if not stretches:
         return None
     # Where scans tell the motion, it leads from behind, too.
@@ -56,18 +74,27 @@ def motion_from_behind(
     tells = sigmas <= options.scan.degeneracy.trusted_sigma
     sigmas = np.where(tells, sigmas, np.maximum(sigmas, from_front.weakest_sigmas))
     sigmas = np.where(is_turn, from_front.weakest_sigmas, sigmas)
-    motion = MotionFromBehind(np.full((count, 3), np.nan), np.zeros(count))
+    motion = MotionFromBehind(np.full((count, 3), np.nan), np.zeros(count), [])
     for first, end in stretches:
-        fits_better = inliers[first - since : end - since].mean() >= _better_share(
-            found, (first, end), options
-        )
         way = _way(poses, first - since, end - since)
-        if fits_better and way - _way(found.poses, first, end) > options.standstill_lag:
-            # The step to the first of them, and the one from the last.
-            whole = slice(max(first - 1, 0), end + 1)
-            motion.poses[whole] = poses[whole.start - since : whole.stop - since]
-            motion.weakest_sigmas[whole] = sigmas[whole.start - since : whole.stop - since]
+        share = float(inliers[first - since : end - since].mean())
+        gain = share - float(found.inliers[first:end].mean())
+        is_clear = gain >= options.standstill_gain
+        fits = share >= options.scan.restart_inliers and gain >= -options.standstill_gain
+        if not fits or way - _way(found.poses, first, end) <= options.standstill_lag:
+            continue
+        whole, ends = _with_ends(first, end), _with_ends(first - since, end - since)
+        turns = [np.abs(wrap(np.diff(each[:, 2]))).max() for each in (found.poses[whole], poses[ends])]
+        # What a robot sees that turns far is new, so that its turn, too, may be wrong from both sides.
+        if is_clear or max(turns) <= options.standstill_turn:
+            motion.poses[whole], motion.weakest_sigmas[whole] = poses[ends], sigmas[ends]
+            motion.unproven.extend([] if is_clear else [(first, end)])
     return motion if np.isfinite(motion.poses).any() else None
+
+
+def _with_ends(first: int, end: int) -> slice:
+    """The scans of a stretch, the step to the first of them, and the one from the last."""
+    return slice(max(first - 1, 0), end + 1)
 
 
 def _turns_from_front(found: TrackedScans, inliers: Array, sigmas: Array, options: TrackingOptions) -> Mask:
@@ -93,20 +120,13 @@ def _with_steps(poses: Array, others: Array, chosen: Mask) -> Array:
     return found
 
 
-def _better_share(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> float:
-    """The share of inliers from which on the scans of a stretch fit clearly better than as `found`."""
-    share = float(found.inliers[slice(*stretch)].mean())
-    return max(share + options.standstill_gain, options.scan.restart_inliers)
-
-
-def _may_fit_better(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> bool:
-    """Whether scans of a stretch could fit clearly better from behind: there are later ones to begin with.
+def _may_fit(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> bool:
+    """Whether scans of a stretch may fit from behind: there are later ones to begin with.
 
     A stretch of fewer scans than tell a velocity does not tell that the robot stands.
     """
     first, end = stretch
-    is_long = end - first >= options.velocity_scans and end < len(found.values)
-    return is_long and _better_share(found, stretch, options) <= 1.0
+    return end - first >= options.velocity_scans and end < len(found.values)
 
 
 def count_before_doubt(found: TrackedScans, options: TrackingOptions, is_start: bool) -> int:

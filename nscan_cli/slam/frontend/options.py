@@ -209,8 +209,11 @@ class TrackingOptions:
     standstill_lag: float = 0.2
     """Least length of the missing way for this, m. A larger value keeps more scans as they are."""
     standstill_gain: float = 0.03
-    """From behind these scans must have a share of inliers that is larger by this. A larger value keeps more
-    scans as they are."""
+    """From behind these scans fit clearly better if their share of inliers is larger by this, and worse if it
+    is smaller by this. A larger value leaves more to `standstill_evidence`."""
+    standstill_evidence: float = 10.0
+    """Where they fit neither clearly better nor worse, the motion from behind counts if the objective of the
+    scans, tracked along it, is lower by this. A larger value keeps more scans as they are."""
     standstill_turn: float = 0.3
     """Where the robot turns farther than this to a scan, rad, what was found from the front counts, unless
     the scan fits clearly better from behind. A larger value believes turns from behind more often."""

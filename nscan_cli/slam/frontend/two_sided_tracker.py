@@ -62,6 +62,11 @@ class TwoSidedTracker:
         if known:
             fresh = self._fresh_scans(scans.first, scans.first + known)
             motion = motion_from_behind(fresh, settled.tracked, self._new_tracker(), self.options)
+        if motion is not None and motion.unproven:
+            along = copy.deepcopy(self)._track_along(fresh.copied(), motion).tracked
+            motion = motion.where_proven(
+                settled.tracked.values, along.values, self.options.standstill_evidence
+            )
         if motion is not None:
             settled = self._track_along(fresh, motion)
         elif known < len(ahead):

@@ -8,7 +8,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from nscan_cli.slam.frontend.motion_from_behind import count_before_doubt, motion_from_behind
+from nscan_cli.slam.frontend.motion_from_behind import (
+    MotionFromBehind,
+    count_before_doubt,
+    motion_from_behind,
+)
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
@@ -56,12 +60,35 @@ def tracked_anew(scans: ScanBatch, size: int) -> TrackedScans:
             continue
         settled = scans.part(row, row + known)
         motion = motion_from_behind(settled.copied(), ahead.part(0, known), Tracker(OPTIONS, False), OPTIONS)
+        if motion is not None and motion.unproven:
+            along = copy.deepcopy(tracker).track(dataclasses.replace(settled.copied(), odometry=motion.poses))
+            motion = motion.where_proven(ahead.values[:known], along.values, OPTIONS.standstill_evidence)
         along = settled if motion is None else dataclasses.replace(settled, odometry=motion.poses)
         found.append(tracker.track(along))
         if motion is not None:
             np.maximum(found[-1].weakest_sigmas, motion.weakest_sigmas, out=found[-1].weakest_sigmas)
         row += known
     return TrackedScans.together(found)
+
+
+def test_a_motion_that_fits_as_well_counts_where_scans_along_it_fit_better():
+    poses, sigmas = np.arange(120.0).reshape(40, 3), np.ones(40)
+    motion = MotionFromBehind(poses, sigmas, [(2, 8), (20, 25)])
+    front, along = np.zeros(40), np.zeros(40)
+    # The second stretch fits, but not what comes after it: its map is wrong.
+    along[2:8], along[20:25], along[25:30] = -2.0, -4.0, 3.0
+    proven = motion.where_proven(front, along, 10.0)
+    assert proven is not None
+    assert not proven.unproven
+    assert np.flatnonzero(np.isnan(proven.poses[:, 0])).tolist() == list(range(19, 26))
+    assert np.flatnonzero(proven.weakest_sigmas == 0.0).tolist() == list(range(19, 26))
+    assert np.isfinite(motion.poses).all(), "the motion itself stays"
+
+
+def test_no_motion_is_left_without_proof():
+    whole = MotionFromBehind(np.full((10, 3), np.nan), np.zeros(10), [(3, 6)])
+    whole.poses[2:7] = 0.0
+    assert whole.where_proven(np.zeros(10), np.full(10, -1.0), 10.0) is None
 
 
 @pytest.mark.parametrize("swept", SWEPT)
