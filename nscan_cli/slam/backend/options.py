@@ -150,8 +150,8 @@ class DegenerateStretchOptions:
     """Standard deviation beyond which a scan does not tell its place along the walls, m. A larger value finds
     less."""
     path: float = 2.0
-    """Least length of such a way, m: as mapped, or, for a warning, at the robot's usual speed. As mapped it
-    is 2.5 m and more in bare corridors, at most 0.7 m elsewhere. A larger value finds less."""
+    """Least length of such a way, m: as mapped, or at the robot's usual speed. As mapped it is 2.5 m and more
+    in bare corridors, at most 0.7 m elsewhere. A larger value finds less."""
     scans_between: int = 2
     """Largest number of successive scans within it that seem to tell their place. A larger number joins more
     ways."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -144,7 +145,8 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     log, poses, sigmas = state.log, np.concatenate(state.tracked), state.weakest_sigmas
     if not sigmas:
         return []
-    options, told = state.options.degenerate_relations.stretch, np.concatenate(sigmas)
+    stretch, least = state.options.degenerate_relations.stretch, state.options.diagnostics.guessed_way
+    options, told = replace(stretch, path=least), np.concatenate(sigmas)
     lost = int(np.isinf(told).sum())
     if lost > state.options.diagnostics.max_lost_share * len(told):
         return [

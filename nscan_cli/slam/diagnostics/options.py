@@ -43,6 +43,9 @@ class DiagnosticsOptions:
     max_lost_share: float = 0.5
     """If more of the scans than this share fit nothing that was seen before, a warning says so in place of
     the ways that no scan tells. A larger value names such ways more often."""
+    guessed_way: float = 1.5
+    """Least length of a way that no scan tells, without odometry, m. In offices it is a metre at most, as
+    mapped or at the robot's usual speed. A larger value warns less."""
     gap_periods: float = 3.0
     """Scans are missing if the next one comes later than this multiple of the median period. A larger value
     warns less."""

@@ -85,8 +85,10 @@ def motion_from_behind(
             continue
         whole, ends = _with_ends(first, end), _with_ends(first - since, end - since)
         turns = [np.abs(wrap(np.diff(each[:, 2]))).max() for each in (found.poses[whole], poses[ends])]
-        # What a robot sees that turns far is new, so that its turn, too, may be wrong from both sides.
-        if is_clear or max(turns) <= options.standstill_turn:
+        tells = found.weakest_sigmas[first:end] <= options.scan.degeneracy.trusted_sigma
+        # What a robot sees that turns far is new, so that its turn, too, may be wrong from both sides. Where
+        # most scans tell their place, they fit badly, and what fits better may be at a wrong place.
+        if is_clear or (max(turns) <= options.standstill_turn and tells.mean() < 0.5):
             motion.poses[whole], motion.weakest_sigmas[whole] = poses[ends], sigmas[ends]
             motion.unproven.extend([] if is_clear else [(first, end)])
     return motion if np.isfinite(motion.poses).any() else None

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.logs.load import read_log
+from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.backend.degenerate_relations import degenerate_stretches
 from nscan_cli.slam.backend.options import DegenerateStretchOptions
@@ -78,6 +79,17 @@ def test_the_hallway_of_a_real_recording_is_told():
     assert told is not None
     assert float(told[1]) > 2.0
     assert 270 < int(told[2]) < int(told[3]) < 360
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_recording_that_begins_while_the_robot_drives_along_bare_walls_is_told(every):
+    """Nothing tells how fast it drives: its first 5 s came out between 1 and 3 m long, without a word."""
+    log = read_log(str(data_file("field/rplidar-hallway.bag")), ReadingOptions(odometry=False))
+    rows = np.arange(len(log) // 3, 2 * len(log) // 3, every)
+    said = "\n".join(notices(mapped(excerpt(log, rows)).state))
+    told = re.search(r"how far the robot went: .* from scan (\d+) to", said)
+    assert told is not None
+    assert int(told[1]) < rows[0] + 20
 
 
 def test_a_laser_that_sees_next_to_nothing_is_told():
