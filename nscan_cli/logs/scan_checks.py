@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from nscan_cli.logs.angle_unit import AngleUnitOptions
 from nscan_cli.logs.beam_angles import BeamAngleOptions
+from nscan_cli.logs.bent_walls import BentWallOptions
 from nscan_cli.logs.blind_scans import BlindScanOptions
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.direction_changes import DirectionChangeOptions
@@ -30,6 +31,7 @@ from nscan_cli.logs.rounded_ranges import RoundedRangeOptions
 from nscan_cli.logs.scan_order import ScanOrderOptions
 from nscan_cli.logs.shared_stamps import SharedStampOptions
 from nscan_cli.logs.slow_odometry import SlowOdometryOptions
+from nscan_cli.logs.square_length import SquareLengthOptions
 from nscan_cli.logs.square_walls import SquareWallOptions
 from nscan_cli.logs.stamp_unit import StampUnitOptions
 from nscan_cli.logs.sweep import SweepOptions
@@ -78,6 +80,10 @@ class ScanCheckOptions:
     """Whether walls fit the angle between beams."""
     square_walls: SquareWallOptions = field(default_factory=SquareWallOptions)
     """Whether walls are square to each other with it."""
+    square_length: SquareLengthOptions = field(default_factory=SquareLengthOptions)
+    """Which length on all ranges makes more walls square to each other."""
+    bent_walls: BentWallOptions = field(default_factory=BentWallOptions)
+    """Which length on all ranges bends walls."""
     range_offset: RangeOffsetOptions = field(default_factory=RangeOffsetOptions)
     """Whether a length is added to all ranges."""
     whole_turn: WholeRevolutionOptions = field(default_factory=WholeRevolutionOptions)
