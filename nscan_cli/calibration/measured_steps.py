@@ -10,7 +10,8 @@ import numpy as np
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.correlative_search import likelihood_field, search
+from nscan_cli.matching.correlative_search import search
+from nscan_cli.matching.likelihood_field import likelihood_field
 from nscan_cli.matching.scan_pairs import ScanPair, match_scans
 from nscan_cli.matching.uncertainty import covariances_of, why_no_minimum
 from nscan_cli.poses import Array, Indices, Mask, relative

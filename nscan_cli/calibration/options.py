@@ -24,8 +24,8 @@ from nscan_cli.calibration.odometry_options import (
 from nscan_cli.calibration.range_jump_options import BearingJitterOptions, OrderJumpOptions, RangeJumpOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.logs.expected_sizes import ExpectedSizes
-from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.pairwise import PairOptions
+from nscan_cli.matching.search_options import SearchOptions
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nscan_cli.matching.correlative_search import (
-    FIELD_LEVELS,
-    LANES,
-    PAD,
-    FoundPose,
-    LikelihoodField,
-    Search,
-    SearchOptions,
-    likelihood_field,
-    search,
-)
+from nscan_cli.matching.correlative_search import FoundPose, Search, search
+from nscan_cli.matching.likelihood_field import TILE, LikelihoodField, likelihood_field
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, relative, transform, wrap
 from tests.matching.problems import Problem, office_problem
 
@@ -29,7 +21,7 @@ def two() -> Problem:
 
 def finest(field: LikelihoodField) -> NDArray[np.float32]:
     """(w, h) the cells of the field itself."""
-    return field.levels[0, PAD:-1, PAD:-1]
+    return field.finest[TILE:-1, TILE:-1]
 
 
 def score(reference: Array, points: Array, pose: Array) -> float:
@@ -90,25 +82,6 @@ def test_what_scores_no_more_than_asked_is_not_found(two):
     assert again is not None
     np.testing.assert_array_equal(again.pose, found.pose)
     assert search(field, two.points[1], true + np.array([500.0, 0.0, 0.0]), 0.0, OPTIONS) is None
-
-
-def test_a_coarser_level_has_the_greatest_value_of_a_square_of_cells(two):
-    field = likelihood_field(two.points[0], OPTIONS)
-    padded = field.levels[0]
-    for around in (padded[:PAD], padded[:, :PAD], padded[-1], padded[:, -1]):
-        assert not around.any()
-    width, height = padded.shape
-    behind = np.pad(padded, (0, PAD))
-    squares = np.lib.stride_tricks.sliding_window_view
-    for level in range(1, FIELD_LEVELS - 1):
-        side = 1 << level
-        greatest = squares(behind, (side, side)).max(axis=(2, 3))[:width, :height]
-        np.testing.assert_array_equal(field.levels[level], greatest)
-    greatest = squares(behind, (PAD, PAD)).max(axis=(2, 3))[:width, :height]
-    for iy in range(height):
-        np.testing.assert_array_equal(field.coarsest[iy % PAD, :, LANES + iy // PAD], greatest[:, iy])
-    assert not field.coarsest[:, :, :LANES].any()
-    assert not field.coarsest[:, :, -LANES:].any()
 
 
 def test_what_was_searched_once_can_be_searched_again(two):

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nscan_cli.matching.correlative_search import FoundPose, LikelihoodField, likelihood_field, search
+from nscan_cli.matching.correlative_search import FoundPose, search
 from nscan_cli.matching.joint.joint_energy import JointProblem
 from nscan_cli.matching.joint.joint_match import JointMatch, PairsAt, match_near_and_far
 from nscan_cli.matching.joint.neutral_energy import neutral_energy, pair_energies
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps, overlaps, weakest_link
+from nscan_cli.matching.likelihood_field import LikelihoodField, likelihood_field
 from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.joint.gauge import gauge_of
+from nscan_cli.matching.search_options import SearchOptions
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.motion_model import MotionModel
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.odometry_noise import OdometryNoiseOptions

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.matching.correlative_search import FoundPose, Search, likelihood_field
+from nscan_cli.matching.correlative_search import FoundPose, Search
+from nscan_cli.matching.likelihood_field import likelihood_field
 from nscan_cli.matching.motion_model import Prior, no_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt

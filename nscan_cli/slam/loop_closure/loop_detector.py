@@ -15,7 +15,7 @@ import numpy as np
 
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, Indices, compose
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others

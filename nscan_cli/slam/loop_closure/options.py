@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.search_options import SearchOptions
 
 
 class FreeSpaceOptions(NamedTuple):

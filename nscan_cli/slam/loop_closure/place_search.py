@@ -12,13 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.graph.model import Loop
-from nscan_cli.matching.correlative_search import (
-    LikelihoodField,
-    Search,
-    SearchOptions,
-    likelihood_field,
-    search,
-)
+from nscan_cli.matching.correlative_search import Search, search
+from nscan_cli.matching.likelihood_field import LikelihoodField, likelihood_field
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, Indices, relative, transform
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route

@@ -14,7 +14,7 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.ndt.grid_growth import make_all_gaussians
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt

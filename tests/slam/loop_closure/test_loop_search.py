@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Loop, Pairwise
-from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.options import NScanOptions

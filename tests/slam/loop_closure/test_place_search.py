@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Loop
-from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import route_of
