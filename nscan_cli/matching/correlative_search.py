@@ -17,7 +17,7 @@ from nscan_cli.matching.likelihood_field import (
     GREATEST_SUM,
     LANE_BITS,
     LEVELS,
-    TILE,
+    TILE_SIDE,
     LikelihoodField,
 )
 from nscan_cli.matching.search_options import SearchOptions
@@ -82,8 +82,8 @@ def _point_cells(
         for k in range(points.shape[0]):
             x = cos * points[k, 0] - sin * points[k, 1] + centre[0]
             y = sin * points[k, 0] + cos * points[k, 1] + centre[1]
-            cells[a, 0, k] = TILE + int(np.floor((x - left) / cell))
-            cells[a, 1, k] = TILE + int(np.floor((y - bottom) / cell))
+            cells[a, 0, k] = TILE_SIDE + int(np.floor((x - left) / cell))
+            cells[a, 1, k] = TILE_SIDE + int(np.floor((y - bottom) / cell))
     return cells
 
 
@@ -152,7 +152,7 @@ def _branch_and_bound(
         a, i, j = tile // (columns * rows), tile // rows % columns, tile % rows
         if sums[a, i, j] <= best * greatest:
             break
-        stack[0, 0], stack[0, 1] = first_x + i * TILE, first_y + j * TILE
+        stack[0, 0], stack[0, 1] = first_x + i * TILE_SIDE, first_y + j * TILE_SIDE
         stack[0, 2], stack[0, 3] = LEVELS, sums[a, i, j]
         size = 1
         while size > 0:

@@ -18,7 +18,7 @@ from nscan_cli.poses import Array
 LEVELS = 4
 """A square of the level l has 2ˡ cells on a side; the coarsest level is this one. Like the three constants
 below, it is a part of the layout of a field's arrays."""
-TILE = 1 << LEVELS
+TILE_SIDE = 1 << LEVELS
 """Cells on a side of a square of the coarsest level."""
 LANES = 8
 """Numbers that are compared side by side."""
@@ -30,7 +30,7 @@ GREATEST_SUM = (1 << LANE_BITS) - 1
 
 
 class LikelihoodField(NamedTuple):
-    """A likelihood field and its levels. It has a border of zeros, TILE cells before and one behind.
+    """A likelihood field and its levels. It has a border of zeros, TILE_SIDE cells before and one behind.
 
     Squares begin at their cell (ix, iy). Their greatest values are rounded up to whole `unit`s, so that sums
     are of small integers.
@@ -44,9 +44,9 @@ class LikelihoodField(NamedTuple):
     coarsest: NDArray[np.uint16]
     """(w, h) the greatest values of the squares of the coarsest level."""
     x: float
-    """Left border of the cells with index TILE, m."""
+    """Left border of the cells with index TILE_SIDE, m."""
     y: float
-    """Lower border of the cells with index TILE, m."""
+    """Lower border of the cells with index TILE_SIDE, m."""
     cell: float
     """Side of a cell, m."""
     unit: int
@@ -62,7 +62,7 @@ def likelihood_field(points: Array, options: SearchOptions) -> LikelihoodField:
         int((end - begin) / options.cell) + 2 for begin, end in ((x, right + margin), (y, top + margin))
     )
     unit = max(GREATEST_SUM // options.beams, 1)
-    finest = np.zeros((width + TILE + 1, height + TILE + 1), dtype=np.float32)
+    finest = np.zeros((width + TILE_SIDE + 1, height + TILE_SIDE + 1), dtype=np.float32)
     _splat(finest, points, x, y, options.cell, options.spread)
     quarters, coarsest = _levels(finest, unit)
     return LikelihoodField(finest, quarters, coarsest, x, y, options.cell, unit)
@@ -73,7 +73,7 @@ def _splat(
     finest: NDArray[np.float32], points: Array, left: float, bottom: float, cell: float, spread: float
 ) -> None:
     """Write the values of the cells, from the nearest point within SPLAT cells."""
-    width, height = finest.shape[0] - TILE - 1, finest.shape[1] - TILE - 1
+    width, height = finest.shape[0] - TILE_SIDE - 1, finest.shape[1] - TILE_SIDE - 1
     squares = np.full((width + 2 * SPLAT, height + SPLAT + LANES), np.inf)
     dy2 = np.full(LANES, np.inf)
     for k in range(points.shape[0]):
@@ -91,7 +91,7 @@ def _splat(
         for iy in range(height):
             square = squares[ix + SPLAT, iy + SPLAT]
             if square < np.inf:
-                finest[ix + TILE, iy + TILE] = np.exp(-0.5 * square / (spread * spread))
+                finest[ix + TILE_SIDE, iy + TILE_SIDE] = np.exp(-0.5 * square / (spread * spread))
 
 
 @kernel
@@ -100,7 +100,7 @@ def _levels(finest: NDArray[np.float32], unit: int) -> tuple[NDArray[np.int64], 
     width, height = finest.shape
     quarters = np.empty((LEVELS - 1, width, height), dtype=np.int64)
     # Cells behind the last ones are zero.
-    finer = np.zeros((width + TILE, height + TILE), dtype=np.uint16)
+    finer = np.zeros((width + TILE_SIDE, height + TILE_SIDE), dtype=np.uint16)
     for ix in range(width):
         for iy in range(height):
             finer[ix, iy] = np.uint16(np.ceil(finest[ix, iy] * unit))

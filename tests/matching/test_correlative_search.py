@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nscan_cli.matching.correlative_search import FoundPose, Search, search
-from nscan_cli.matching.likelihood_field import TILE, LikelihoodField, likelihood_field
+from nscan_cli.matching.likelihood_field import TILE_SIDE, LikelihoodField, likelihood_field
 from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.poses import Array, relative, transform, wrap
 from tests.matching.problems import Problem, office_problem
@@ -21,7 +21,7 @@ def two() -> Problem:
 
 def finest(field: LikelihoodField) -> NDArray[np.float32]:
     """(w, h) the cells of the field itself."""
-    return field.finest[TILE:-1, TILE:-1]
+    return field.finest[TILE_SIDE:-1, TILE_SIDE:-1]
 
 
 def score(reference: Array, points: Array, pose: Array) -> float:

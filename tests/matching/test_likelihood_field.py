@@ -9,7 +9,7 @@ from nscan_cli.matching.likelihood_field import (
     GREATEST_SUM,
     LANE_BITS,
     LEVELS,
-    TILE,
+    TILE_SIDE,
     LikelihoodField,
     likelihood_field,
 )
@@ -32,14 +32,19 @@ def greatest(field: LikelihoodField, side: int) -> Array:
 
 
 def test_around_a_field_is_a_border_of_zeros(field):
-    for around in (field.finest[:TILE], field.finest[:, :TILE], field.finest[-1], field.finest[:, -1]):
+    for around in (
+        field.finest[:TILE_SIDE],
+        field.finest[:, :TILE_SIDE],
+        field.finest[-1],
+        field.finest[:, -1],
+    ):
         assert not around.any()
     for around in (field.coarsest[0], field.coarsest[:, 0], field.coarsest[-1], field.coarsest[:, -1]):
         assert not around.any()
 
 
 def test_the_coarsest_level_has_the_greatest_value_of_a_square_of_cells_rounded_up(field):
-    np.testing.assert_array_equal(field.coarsest, np.ceil(greatest(field, TILE) * field.unit))
+    np.testing.assert_array_equal(field.coarsest, np.ceil(greatest(field, TILE_SIDE) * field.unit))
 
 
 @pytest.mark.parametrize("level", range(2, LEVELS + 1))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from nscan_cli.matching.correlative_search import Search
-from nscan_cli.matching.likelihood_field import TILE, likelihood_field
+from nscan_cli.matching.likelihood_field import TILE_SIDE, likelihood_field
 from nscan_cli.matching.search_options import SearchOptions
 from nscan_cli.matching.tile_sums import tile_sums
 
@@ -19,8 +19,8 @@ def plain(
     """The sums that are not zero, by the angle and the first shift of the tile."""
     sums = {}
     for angle, (xs, ys) in enumerate(cells.tolist()):
-        for ox in range(-reach, reach + 1, TILE):
-            for oy in range(-reach, reach + 1, TILE):
+        for ox in range(-reach, reach + 1, TILE_SIDE):
+            for oy in range(-reach, reach + 1, TILE_SIDE):
                 total = 0
                 for x, y in zip(xs, ys, strict=True):
                     if 0 <= x + ox < coarsest.shape[0] and 0 <= y + oy < coarsest.shape[1]:
@@ -42,7 +42,7 @@ def test_every_tile_has_the_sum_of_its_definition(seed, size, reach, spread):
     cells = rng.integers(-spread, spread, (3, 2, 20)).astype(np.int32)
     sums, first = tile_sums(coarsest, cells, reach)
     found = {
-        (angle, first[0] + TILE * i, first[1] + TILE * j): int(sums[angle, i, j])
+        (angle, first[0] + TILE_SIDE * i, first[1] + TILE_SIDE * j): int(sums[angle, i, j])
         for angle, i, j in np.argwhere(sums).tolist()
     }
     assert found == plain(coarsest, cells, reach)
@@ -56,7 +56,7 @@ def test_where_a_robot_may_be_anywhere_tiles_take_little_memory():
     field = likelihood_field(reference, anywhere)
     sums = Search(field, scan, np.zeros(3), anywhere)._tiles.sums
     assert sums.itemsize == 2
-    across = (20.0 + 2 * np.hypot(10.0, 10.0)) / anywhere.cell / TILE + 3
+    across = (20.0 + 2 * np.hypot(10.0, 10.0)) / anywhere.cell / TILE_SIDE + 3
     assert max(sums.shape[1:]) <= across
     elsewhere = Search(field, scan, np.array([500.0, 0.0, 0.0]), anywhere)
     assert elsewhere._tiles.sums.size == 0

@@ -28,6 +28,7 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.place_search import find_place, why_match_doubted
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty
+from nscan_cli.slam.loop_closure.search_turns import SearchTurns
 from nscan_cli.slam.loop_closure.slip_evidence import SlipEvidence
 from nscan_cli.slam.loop_closure.verification import LOST, is_lost, places_agree, why_too_few
 
@@ -46,7 +47,7 @@ class LoopDetector:
         self._refused: list[Loop] = []
         self._waiting: list[tuple[Place, str]] = []
         self._uncertainty, self._links = RelativeUncertainty(), LinkCache()
-        self._searched = -np.inf
+        self._searched, self._turns = -np.inf, SearchTurns(options)
 
     def begin_again(self, options: LoopClosureOptions) -> None:
         """Let the keyframes come anew, to be searched with these options.
@@ -56,6 +57,7 @@ class LoopDetector:
         self.options = options
         self._refused, self._waiting = self.refused(), []
         self._searched, self._uncertainty = -np.inf, RelativeUncertainty()
+        self._turns = SearchTurns(options)
 
     def extend(self, relation: Pairwise, length: float, odometry: Array | None = None) -> None:
         """Add a relation of the chain over a path of `length` (m); `odometry` (3,) is it by odometry."""
@@ -153,21 +155,38 @@ class LoopDetector:
         return np.flatnonzero(older & may_be & (bound > options.match_reach))
 
     def _search(self, route: Route, centre: int, near: Indices, sigma: RelativeSigma) -> Place | None:
-        """Search among the visit that is most likely near. If not even the direction is known, search all."""
-        away = distances_from(route, centre)
-        places, lost = [], is_lost(sigma, self.options)
-        while len(near):
-            first = int(near[np.argmin(away[near] - self.options.sigmas * sigma.distance[near])])
-            window, around = self._visit(route, centre, first, sigma)
-            found = None
-            if not lost[first] or len(around) >= self.options.min_lost_visit:
-                found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
+        """The place, of those found in pieces of the map, that fits best."""
+        places = []
+        for window, around in self._pieces(route, centre, near, sigma):
+            found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
+            self._turns.took(around, route.paths[centre], found is not None)
             if isinstance(found, Loop):
                 self._refused.append(found)
             elif found is not None:
                 places.append(found)
-            near = np.setdiff1d(near, [first, *around]) if lost[first] else near[:0]
         return max(places, key=_visit_overlap, default=None)
+
+    def _pieces(
+        self, route: Route, centre: int, near: Indices, sigma: RelativeSigma
+    ) -> list[tuple[SearchOptions, Indices]]:
+        """Where to search: the visit that is most likely near, as by _visit.
+
+        If not even the direction is known, all pieces of the map may be near, and those whose turn it is are
+        searched.
+        """
+        away = distances_from(route, centre)
+        lost, known, pieces = is_lost(sigma, self.options), [], []
+        while len(near):
+            first = int(near[np.argmin(away[near] - self.options.sigmas * sigma.distance[near])])
+            window, around = self._visit(route, centre, first, sigma)
+            if not lost[first]:
+                known.append((window, around))
+                break
+            if len(around) >= self.options.min_lost_visit:
+                pieces.append((window, around))
+            near = np.setdiff1d(near, [first, *around])
+        turns = self._turns.next([around for _, around in pieces])
+        return [*(pieces[turn] for turn in turns), *known]
 
     def _visit(
         self, route: Route, centre: int, first: int, sigma: RelativeSigma

@@ -91,6 +91,9 @@ class LoopClosureOptions:
     min_lost_visit: int = 3
     """Least number of keyframes in one piece of an earlier visit among which a keyframe is searched that may
     be anywhere: a short piece tells no place, and there may be hundreds. A larger number searches less."""
+    max_lost_searches: int = 5
+    """Most pieces of the map among which one keyframe is searched that may be anywhere: they take turns. A
+    larger number finds places earlier where the track broke often, and takes longer."""
     min_score_far: float = 0.45
     """Least share of points that fit where the path may be off by more than `min_distance`. It is smaller
     than `min_score`: only such a loop corrects the path there, and a laser that looks ahead sees half of what

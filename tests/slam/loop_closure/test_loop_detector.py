@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Loop, Pairwise
-from nscan_cli.poses import compose, relative
+from nscan_cli.poses import Indices, compose, relative
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.keyframes.route import route_of
@@ -208,6 +209,30 @@ def test_who_is_lost_is_not_searched_for_in_pieces_of_two_keyframes(monkeypatch,
     monkeypatch.setattr(loop_detector, "find_place", lambda *_arguments: searched.append(True))
     closed_along(lost(drive, LoopClosureOptions(min_lost_visit=least)), drive, until=55)
     assert bool(searched) == is_searched
+
+
+def searches(monkeypatch: pytest.MonkeyPatch, drive: Driven, most: int) -> tuple[Counter[int], set[int]]:
+    """The number of searches by keyframe, and all keyframes among which one was searched, when none finds."""
+    searched, among = Counter[int](), set[int]()
+
+    def finds_nothing(_route: object, centre: int, earlier: Indices, *_arguments: object) -> None:
+        searched[centre] += 1
+        among.update(earlier.tolist())
+
+    monkeypatch.setattr(loop_detector, "find_place", finds_nothing)
+    closed_along(lost(drive, LoopClosureOptions(max_lost_searches=most)), drive)
+    return searched, among
+
+
+def test_who_is_lost_is_searched_for_in_few_of_many_pieces_at_once(monkeypatch):
+    """The track breaks twelve times. Each keyframe takes a few searches, and no piece is left out."""
+    drive, most = carried(range(4, 52, 4)), LoopClosureOptions().max_lost_searches
+    few, among = searches(monkeypatch, drive, most)
+    assert max(few.values()) == most
+    every, among_every = searches(monkeypatch, drive, 100)
+    assert max(every.values()) > 2 * most
+    assert few.total() < 0.7 * every.total()
+    assert among == among_every
 
 
 # ----------------------------------------------------------------------------- where is searched
