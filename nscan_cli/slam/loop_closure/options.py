@@ -91,7 +91,7 @@ class LoopClosureOptions:
     min_lost_visit: int = 3
     """Least number of keyframes in one piece of an earlier visit among which a keyframe is searched that may
     be anywhere: a short piece tells no place, and there may be hundreds. A larger number searches less."""
-    max_lost_searches: int = 5
+    max_lost_searches: int = 3
     """Most pieces of the map among which one keyframe is searched that may be anywhere: they take turns. A
     larger number finds places earlier where the track broke often, and takes longer."""
     min_score_far: float = 0.45
