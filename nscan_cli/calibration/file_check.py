@@ -16,6 +16,7 @@ from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.contradictions import changed_view, find_contradictions
 from nscan_cli.calibration.findings import Finding
+from nscan_cli.calibration.heading_jumps import checked_heading_jumps
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.odometry_delay import checked_delay
@@ -58,6 +59,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, jumps = checked_ranges(log, compared, options)
     known: KnownSteps = {}
     log, headings = checked_headings(log, reading, options, known)
+    log, turned_back = checked_heading_jumps(log, options, known)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
@@ -93,7 +95,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if not is_mirror_image:
         # In the unit of the mounting.
         log = _agreeing(log, findings)
-    said += jitter + order + jumps + headings + units + held + stretched + reversing + late
+    said += jitter + order + jumps + headings + turned_back + units + held + stretched + reversing + late
     said += [finding.message for finding in findings] + along
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.

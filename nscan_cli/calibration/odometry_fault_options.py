@@ -91,6 +91,31 @@ class ReversedHeadingOptions:
 
 
 @dataclass(frozen=True)
+class HeadingJumpOptions:
+    """When headings by odometry jump, and its positions do not."""
+
+    min_jump: float = 0.1
+    """Least jump, rad. A smaller one is left to matching. A larger value finds less."""
+    max_jumps: int = 64
+    """So many of the largest turns may be jumps. A larger number takes longer."""
+    min_driven: float = 0.02
+    """Shortest step that tells which way the robot drives, m. A larger value needs faster robots."""
+    min_steps: int = 8
+    """Least number of these steps before a jump and behind it. A larger value finds less near the ends of a
+    log."""
+    most_steps: int = 60
+    """So many of these steps next to the jump are looked at. With more, other jumps matter."""
+    min_agreement: float = 0.8
+    """Least length of the mean of their directions, in the robot's frame: 1 if it always drives the same way,
+    or to and fro. A larger value finds less."""
+    tolerance: float = 0.3
+    """The robot turns against the jump in its own frame, to within this share of it. A larger value finds
+    more."""
+    max_turn: float = 0.3
+    """By the scans it turns by at most this share of the jump. A larger value finds more."""
+
+
+@dataclass(frozen=True)
 class ScaledStretchOptions:
     """When the lengths of odometry are multiplied by something from a scan to another."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.odometry_fault_options import (
     ClockChangeOptions,
+    HeadingJumpOptions,
     ReversedHeadingOptions,
     ScaledStretchOptions,
     UnsteadyStampOptions,
@@ -99,6 +100,8 @@ class FileCheckOptions:
     """When odometry fits the scans at no offset of its stamps."""
     headings: ReversedHeadingOptions = field(default_factory=ReversedHeadingOptions)
     """When headings by odometry count the wrong way, and its positions do not."""
+    heading_jumps: HeadingJumpOptions = field(default_factory=HeadingJumpOptions)
+    """When headings by odometry jump, and its positions do not."""
     stretches: ScaledStretchOptions = field(default_factory=ScaledStretchOptions)
     """When the lengths of odometry are multiplied by something over a part of the log."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
