@@ -13,7 +13,7 @@ import numpy as np
 
 from nscan_cli.calibration.changed_odometry import with_changed_odometry
 from nscan_cli.calibration.findings import UNDONE
-from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_fault_options import HeadingJumpOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.files.text import shortened_list
@@ -39,9 +39,7 @@ def checked_heading_jumps(
     for row in heading_jumps(poses, options.heading_jumps):
         first = int(np.searchsorted(log.times, times[row - 1], side="right")) - 1
         last = int(np.searchsorted(log.times, times[row]))
-        if first < 0 or last >= len(log) or not are_known(log.odometry[[first, last]]).all():
-            continue
-        across = measure_steps(log, (np.array([first]), np.array([last])), options.steps, known=known)
+        across = _measured_across(log, first, last, options, known)
         if not len(across):
             continue
         turn, turned = float(across.laser[0, 2]), float(across.odometry(log.odometry)[0, 2])
@@ -57,6 +55,17 @@ def checked_heading_jumps(
         f"as before: they are turned back from there on; {UNDONE}"
     )
     return log, [message]
+
+
+def _measured_across(
+    log: LaserLog, first: int, last: int, options: FileCheckOptions, known: KnownSteps
+) -> MeasuredSteps:
+    """The step from a row to another, or from or to one beside them, that scans measure; empty if none."""
+    pairs = np.array([(first - before, last + behind) for before in (0, 1) for behind in (0, 1)])
+    inside = pairs[(pairs[:, 0] >= 0) & (pairs[:, 1] < len(log))]
+    assert log.odometry is not None
+    kept = inside[are_known(log.odometry)[inside].all(axis=1)]
+    return measure_steps(log, (kept[:, 0], kept[:, 1]), options.steps, known=known)
 
 
 def heading_jumps(poses: Array, options: HeadingJumpOptions) -> list[int]:

@@ -108,10 +108,10 @@ class HeadingJumpOptions:
     min_agreement: float = 0.8
     """Least length of the mean of their directions, in the robot's frame: 1 if it always drives the same way,
     or to and fro. A larger value finds less."""
-    tolerance: float = 0.3
+    tolerance: float = 0.4
     """The robot turns against the jump in its own frame, to within this share of it. A larger value finds
     more."""
-    max_turn: float = 0.3
+    max_turn: float = 0.4
     """By the scans it turns by at most this share of the jump. A larger value finds more."""
 
 
