@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -46,8 +47,8 @@ def real(name: str, rows: slice) -> LaserLog:
     return replace(excerpt(read_log(str(data_file(name))), rows), odometry_path=None)
 
 
-DRIVES = {
-    "simulated": (lambda: drive(), 150),
+DRIVES: dict[str, tuple[Callable[[], LaserLog], int]] = {
+    "simulated": (drive, 150),
     "intel": (lambda: real("intel.log.gz", slice(6000, 9000)), 1500),
     "mit-csail": (lambda: real("mit-csail.log.gz", slice(900, 1900)), 500),
     "urg-corridor-1": (lambda: real("field/urg-corridor-1.bag", slice(None)), 385),

@@ -61,8 +61,8 @@ def tracked_anew(scans: ScanBatch, size: int) -> TrackedScans:
         settled = scans.part(row, row + known)
         motion = motion_from_behind(settled.copied(), ahead.part(0, known), Tracker(OPTIONS, False), OPTIONS)
         if motion is not None and motion.unproven:
-            along = copy.deepcopy(tracker).track(dataclasses.replace(settled.copied(), odometry=motion.poses))
-            motion = motion.where_proven(ahead.values[:known], along.values, OPTIONS.standstill_evidence)
+            tried = copy.deepcopy(tracker).track(dataclasses.replace(settled.copied(), odometry=motion.poses))
+            motion = motion.where_proven(ahead.values[:known], tried.values, OPTIONS.standstill_evidence)
         along = settled if motion is None else dataclasses.replace(settled, odometry=motion.poses)
         found.append(tracker.track(along))
         if motion is not None:
