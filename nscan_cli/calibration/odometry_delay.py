@@ -37,12 +37,14 @@ def checked_delay(
         return log, reading, []
     rows = np.array([pair for pair, step in known.items() if step is not None], dtype=np.int64).reshape(-1, 2)
     turned = np.array([step[0][2] for step in known.values() if step is not None])
-    if not _delay(log, rows[:, 0], rows[:, 1], turned, options.lag, options.lag.first_sigmas):
+    lag = options.lag
+    first = replace(lag, min_turns=lag.first_turns, sigmas=lag.first_sigmas)
+    if not _delay(log, rows[:, 0], rows[:, 1], turned, first):
         return log, reading, []
     steps = measure_steps(
         log, telling_steps(log, options.steps, options.more_steps), options.steps, known=known
     )
-    delay = _delay(log, steps.first, steps.last, steps.laser[:, 2], options.lag, options.lag.sigmas)
+    delay = _delay(log, steps.first, steps.last, steps.laser[:, 2], lag)
     if not delay:
         return log, reading, []
     reading = replace(reading, clock_offset=delay)
@@ -69,13 +71,11 @@ def best_delay(log: LaserLog, steps: MeasuredSteps, options: DelayOptions, sign:
     return _best_delay(log, steps.first, steps.last, sign * steps.laser[:, 2], options)
 
 
-def _delay(
-    log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions, sigmas: float
-) -> float:
+def _delay(log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions) -> float:
     """Seconds to add to the stamps of odometry, so that its turns fit those (n,) of the steps from rows to
-    rows (n,); 0 in doubt: with a mean gain of fewer standard deviations than `sigmas`."""
+    rows (n,); 0 in doubt."""
     found = _best_delay(log, first, last, turned, options)
-    if found is None or not found.is_between or found.sigmas < sigmas:
+    if found is None or not found.is_between or found.sigmas < options.sigmas:
         return 0.0
     is_clear = found.left <= min(options.max_left * found.as_stamped, options.max_disagreement)
     return found.delay if is_clear and abs(found.delay) >= options.least else 0.0

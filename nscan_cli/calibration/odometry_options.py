@@ -62,9 +62,12 @@ class DelayOptions:
     turns the wrong way, they disagree less with any delay. A larger value finds more."""
     sigmas: float = 4.0
     """Least mean gain of the turns with the delay, in its standard deviations. A larger value finds less."""
-    first_sigmas: float = 1.3
+    first_sigmas: float = 1.0
     """More steps are measured where the first few gain so much: of ten times as many, the gain is three times
     as clear. A larger value takes less time, and finds less."""
+    first_turns: int = 5
+    """And where so many of these have a turn. A larger number takes less time, and finds less where robots
+    seldom turn."""
     fitted: int = 3
     """Number of delays on each side of the best one that a parabola fits. With more the curve is less like a
     parabola."""

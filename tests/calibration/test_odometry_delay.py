@@ -18,6 +18,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.consistency.repeated_maps import mirrored
 from tests.calibration.test_file_check import drive
 from tests.data import TURNING_LOG, data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation import odometry_faults
 
 
@@ -49,6 +50,17 @@ def test_no_lag_is_found_where_there_is_none_or_nobody_asks():
     assert not [said for said in checked(late, never).messages if said.startswith("odometry is stamped")]
     backwards = odometry_faults.turning(log, -1.0)
     assert not [said for said in checked(backwards).messages if said.startswith("odometry is stamped")]
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_it_is_found_where_a_robot_seldom_turns(every):
+    """With every second scan few turns were among the first steps, and the map was another one."""
+    log = read_log(str(data_file("mit-killian.log.gz")), ReadingOptions(every=every))
+    third = excerpt(
+        log, slice(0, int(np.searchsorted(log.times, log.times[0] + (log.times[-1] - log.times[0]) / 3)))
+    )
+    (said,) = [message for message in checked(third).messages if "stamped" in message]
+    assert re.match(r"odometry is stamped 0\.6\d? s too early", said)
 
 
 @pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail", "fr-campus", "fr-clinic"])
