@@ -1,6 +1,6 @@
 """The length by which all ranges are too long or too short, by walls that stand square to each other.
 
-square_walls.py says why a length turns walls. Unlike the bend of single walls (range_offset.py), these turns
+square_walls.py says why a length turns walls. Unlike the bend of single walls (bent_walls.py), these turns
 are seen on short walls and at any distance, and round things do not look like them.
 """
 
