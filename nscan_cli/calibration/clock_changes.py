@@ -6,21 +6,19 @@ clock_offset.py look for one offset of all stamps.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.moved_stamps import with_moved_part
 from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
-from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, Mask, are_known
+from nscan_cli.poses import Array
 
 
 class ClockChange(NamedTuple):
@@ -86,20 +84,16 @@ def clock_change(
 ) -> ClockChange | None:
     """The place at which two offsets explain the turns of known steps best; None for fewer turns than `least`
     on both sides, of which there are more where more turns are known."""
-    assert log.odometry is not None
-    at, headings = log.times, log.odometry[:, 2]
-    if log.odometry_path is not None:
-        at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
-    is_known = np.isfinite(headings)
+    at, poses = log.known_odometry()
     steps = sorted((*pair, float(step[0][2])) for pair, step in known.items() if step is not None)
     first, last, turned = np.array(steps).reshape(-1, 3)[[abs(s[2]) >= options.min_turn for s in steps]].T
     least = max(least, min(options.min_turns, len(turned) // 3))
-    if len(turned) < 2 * least or np.count_nonzero(is_known) < 2:
+    if len(turned) < 2 * least or len(at) < 2:
         return None
     begins, ends = (log.middle_times[rows.astype(np.int64)] for rows in (first, last))
     count = round(options.longest / options.step)
     offsets = options.step * np.arange(-count, count + 1, dtype=np.float64)
-    path = at[is_known], np.unwrap(headings[is_known])
+    path = at, np.unwrap(poses[:, 2])
     off = np.minimum(turn_differences(path, (begins, ends), turned, offsets), options.max_difference)
     sums = np.cumsum(off, axis=1)
     before, both = sums[:, least - 1 : len(turned) - least], sums[:, -1:]
@@ -139,36 +133,3 @@ class _TurnsOfSide(NamedTuple):
         sigma = max(float(more.std(ddof=1)), 1e-9) / len(more) ** 0.5
         off = float(own.sum())
         return cls(float(more.mean()) / sigma, off / float(turns.sum()), off / max(float(other.sum()), 1e-9))
-
-
-def with_moved_part(
-    log: LaserLog, time: float, by: float, is_behind: bool, unsure: tuple[float, float] = (0.0, 0.0)
-) -> LaserLog:
-    """The log with `by` (s) added to the stamps of its odometry behind a time (s), or before it.
-
-    From a time to another where it is `unsure` which it is, poses are left out: some would be far off.
-
-    Of poses that come to lie beside those of the other part, the later ones are left out.
-    """
-    if log.odometry is None:
-        return log
-
-    def moved(times: Array) -> tuple[Array, Mask]:
-        """The times (n,) of n poses, moved, and which are used."""
-        there = times + np.where((times > time) == is_behind, by, 0.0)
-        latest = np.maximum.accumulate(there)
-        is_sure = (times <= unsure[0]) | (times >= unsure[1])
-        is_later: Mask = np.append(True, there[1:] > latest[:-1])
-        return there, is_later & is_sure
-
-    path = log.odometry_path
-    if path is None:
-        known = np.flatnonzero(are_known(log.odometry))
-        at, used = moved(log.times[known])
-        poses = log.odometry[known[used]]
-        return replace(log, odometry=interpolated_poses(log.times, at[used], poses, "pose", []))
-    at, used = moved(path.times)
-    path = robot_path(at[used], path.poses[used])
-    if path is None:
-        return log
-    return replace(log, odometry=moved_odometry(log.odometry, path, log.times), odometry_path=path)

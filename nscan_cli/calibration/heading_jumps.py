@@ -13,7 +13,7 @@ import numpy as np
 
 from nscan_cli.calibration.changed_odometry import with_changed_odometry
 from nscan_cli.calibration.findings import UNDONE
-from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
 from nscan_cli.calibration.odometry_fault_options import HeadingJumpOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.files.text import shortened_list
@@ -31,18 +31,14 @@ def checked_heading_jumps(
     said: list[str] = []
     if log.odometry is None:
         return log, said
-    times, poses = log.times, log.odometry
-    if log.odometry_path is not None:
-        times, poses = log.odometry_path.times, log.odometry_path.poses
-    rows = np.flatnonzero(are_known(poses))
-    times, poses = times[rows], poses[rows]
+    times, poses = log.known_odometry()
     for row in heading_jumps(poses, options.heading_jumps):
         first = int(np.searchsorted(log.times, times[row - 1], side="right")) - 1
         last = int(np.searchsorted(log.times, times[row]))
-        across = _measured_across(log, first, last, options, known)
-        if not len(across):
+        turns = _turns_across(log, first, last, options, known)
+        if turns is None:
             continue
-        turn, turned = float(across.laser[0, 2]), float(across.odometry(log.odometry)[0, 2])
+        turn, turned = turns
         jump = float(wrap(turned - turn))
         if abs(turn) > options.heading_jumps.max_turn * abs(jump):
             continue
@@ -57,15 +53,21 @@ def checked_heading_jumps(
     return log, [message]
 
 
-def _measured_across(
+def _turns_across(
     log: LaserLog, first: int, last: int, options: FileCheckOptions, known: KnownSteps
-) -> MeasuredSteps:
-    """The step from a row to another, or from or to one beside them, that scans measure; empty if none."""
-    pairs = np.array([(first - before, last + behind) for before in (0, 1) for behind in (0, 1)])
-    inside = pairs[(pairs[:, 0] >= 0) & (pairs[:, 1] < len(log))]
+) -> tuple[float, float] | None:
+    """The turn by scans and that by odometry, rad, from a row to another, or from or to one beside them.
+
+    None if scans measure no such step.
+    """
     assert log.odometry is not None
-    kept = inside[are_known(log.odometry)[inside].all(axis=1)]
-    return measure_steps(log, (kept[:, 0], kept[:, 1]), options.steps, known=known)
+    is_known = are_known(log.odometry)
+    for begin, end in ((first - before, last + behind) for before in (0, 1) for behind in (0, 1)):
+        if begin >= 0 and end < len(log) and is_known[[begin, end]].all():
+            step = measure_steps(log, (np.array([begin]), np.array([end])), options.steps, known=known)
+            if len(step):
+                return float(step.laser[0, 2]), float(step.odometry(log.odometry)[0, 2])
+    return None
 
 
 def heading_jumps(poses: Array, options: HeadingJumpOptions) -> list[int]:

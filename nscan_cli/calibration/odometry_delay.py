@@ -14,16 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
+from nscan_cli.calibration.moved_stamps import with_delay
 from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, Indices, are_known
+from nscan_cli.poses import Array, Indices
 
 
 def checked_delay(
@@ -84,14 +83,11 @@ def _delay(log: LaserLog, first: Indices, last: Indices, turned: Array, options:
 def _best_delay(
     log: LaserLog, first: Indices, last: Indices, turned: Array, options: DelayOptions
 ) -> TurnDelay | None:
-    assert log.odometry is not None
-    at, headings = log.times, log.odometry[:, 2]
-    if log.odometry_path is not None:
-        at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
-    is_known, turns = np.isfinite(headings), np.abs(turned) >= options.min_turn
-    if np.count_nonzero(turns) < options.min_turns or not is_known.any():
+    at, poses = log.known_odometry()
+    turns = np.abs(turned) >= options.min_turn
+    if np.count_nonzero(turns) < options.min_turns or not len(at):
         return None
-    known = at[is_known], np.unwrap(headings[is_known])
+    known = at, np.unwrap(poses[:, 2])
     count = round(options.longest / options.step)
     delays = options.step * np.arange(-count, count + 1, dtype=np.float64)
     steps, turned = (log.middle_times[first[turns]], log.middle_times[last[turns]]), turned[turns]
@@ -109,21 +105,6 @@ def _best_delay(
         float(gains.mean()) / sigma if sigma > 0.0 else 0.0,
         0 < best < 2 * count,
     )
-
-
-def with_delay(log: LaserLog, delay: float) -> LaserLog:
-    """The log with `delay` (s) added to the stamps of its odometry."""
-    path, odometry = log.odometry_path, log.odometry
-    if odometry is None:
-        return log
-    if path is None:
-        known, unsaid = are_known(odometry), list[str]()
-        moved = interpolated_poses(log.times, (log.times + delay)[known], odometry[known], "pose", unsaid)
-        return replace(log, odometry=moved)
-    path = robot_path(path.times + delay, path.poses)
-    if path is None:
-        return log
-    return replace(log, odometry=moved_odometry(odometry, path, log.times), odometry_path=path)
 
 
 def said_late(delay: float, offset: float, why: str) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 
 from nscan_cli.calibration.calibrated_reading import DECIMALS
 from nscan_cli.calibration.file_sweep import file_sweep_times, stamp_place, usual_sweep_time, with_sweep_times
-from nscan_cli.calibration.odometry_delay import said_late, with_delay
+from nscan_cli.calibration.moved_stamps import with_delay
+from nscan_cli.calibration.odometry_delay import said_late
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_delay import sweep_delay

@@ -8,7 +8,8 @@ are compared with scans of other times, and moving all of them by the same time 
 from __future__ import annotations
 
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
-from nscan_cli.calibration.odometry_delay import TurnDelay, best_delay, with_delay
+from nscan_cli.calibration.moved_stamps import with_delay
+from nscan_cli.calibration.odometry_delay import TurnDelay, best_delay
 from nscan_cli.calibration.odometry_fault_options import UnsteadyStampOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import StepEvidence

@@ -21,7 +21,7 @@ from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.odometry_interpolation import moved_odometry
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import RobotPath, bent_path, likelier_path, robot_path
-from nscan_cli.poses import Array, Indices, compose
+from nscan_cli.poses import Array, Indices, are_known, compose
 
 SCANS_AT_ONCE = 256
 """Scans whose points are computed together."""
@@ -188,6 +188,15 @@ class LaserLog:
         beams = self.beam_times.of(rows)
         times = beams.first[:, None] + beams.step[:, None] * np.arange(self.ranges.shape[1])
         return points, ends, times[np.isfinite(self.ranges[rows])][near]
+
+    def known_odometry(self) -> tuple[Array, Array]:
+        """The times (P,), s, and known poses (P, 3) of the odometry, at its own times if there are any."""
+        if self.odometry is None:
+            return np.empty(0), np.empty((0, 3))
+        path = self.odometry_path
+        times, poses = (self.times, self.odometry) if path is None else (path.times, path.poses)
+        known = np.flatnonzero(are_known(poses))
+        return times[known], poses[known]
 
     @property
     def middle_times(self) -> Array:

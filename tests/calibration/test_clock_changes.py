@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.clock_changes import ClockChange, with_moved_part
+from nscan_cli.calibration.clock_changes import ClockChange
 from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.moved_stamps import with_moved_part
 from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog

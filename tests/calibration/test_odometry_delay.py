@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.file_check import CheckedFile, checked_file
-from nscan_cli.calibration.odometry_delay import with_delay
+from nscan_cli.calibration.moved_stamps import with_delay
 from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
