@@ -16,7 +16,7 @@ from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.step_sampling import telling_steps
-from nscan_cli.calibration.turn_differences import turn_differences
+from nscan_cli.calibration.turn_differences import Turns, turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 
@@ -56,12 +56,16 @@ def checked_clock_change(
     """
     if log.odometry is None:
         return log, []
-    change = clock_change(log, known, options.clock_change, options.clock_change.first_turns)
+    change = clock_change(
+        log, Turns.of_known(known, log.middle_times), options.clock_change, options.clock_change.first_turns
+    )
     if change is None or not change.is_clear(options.clock_change.first_sigmas, options.clock_change):
         return log, []
     rows = telling_steps(log, options.steps, options.more_steps)
     measure_steps(log, rows, options.steps, known=known)
-    change = clock_change(log, known, options.clock_change, options.clock_change.min_turns)
+    change = clock_change(
+        log, Turns.of_known(known, log.middle_times), options.clock_change, options.clock_change.min_turns
+    )
     if change is None or not change.is_clear(options.clock_change.sigmas, options.clock_change):
         return log, []
     by = change.behind - change.before
@@ -79,18 +83,14 @@ def checked_clock_change(
     return moved, [said]
 
 
-def clock_change(
-    log: LaserLog, known: KnownSteps, options: ClockChangeOptions, least: int
-) -> ClockChange | None:
-    """The place at which two offsets explain the turns of known steps best; None for fewer turns than `least`
-    on both sides, of which there are more where more turns are known."""
+def clock_change(log: LaserLog, turns: Turns, options: ClockChangeOptions, least: int) -> ClockChange | None:
+    """The place at which two offsets explain the turns by scans best; None for fewer turns than `least` on
+    both sides, of which there are more where more turns are known."""
     at, poses = log.known_odometry()
-    steps = sorted((*pair, float(step[0][2])) for pair, step in known.items() if step is not None)
-    first, last, turned = np.array(steps).reshape(-1, 3)[[abs(s[2]) >= options.min_turn for s in steps]].T
+    begins, ends, turned = turns.of_at_least(options.min_turn)
     least = max(least, min(options.min_turns, len(turned) // 3))
     if len(turned) < 2 * least or len(at) < 2:
         return None
-    begins, ends = (log.middle_times[rows.astype(np.int64)] for rows in (first, last))
     count = round(options.longest / options.step)
     offsets = options.step * np.arange(-count, count + 1, dtype=np.float64)
     path = at, np.unwrap(poses[:, 2])

@@ -1,7 +1,7 @@
 """The offset of odometry's clock from that of the scans: the one with which their turns agree best.
 
-It may be as long as two minutes, as where two computers recorded; a warning names it, and `calibrate` refines
-it. odometry_delay.py and sweep_delay.py find delays up to 1.5 s, which are put right.
+It may be as long as two minutes, as where two computers recorded. It is put right, unless the user gave one,
+and then named; `calibrate` refines it. odometry_delay.py and sweep_delay.py find delays up to 1.5 s.
 """
 
 from __future__ import annotations

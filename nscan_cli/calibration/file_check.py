@@ -19,7 +19,8 @@ from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.heading_jumps import checked_heading_jumps
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
-from nscan_cli.calibration.odometry_delay import checked_delay
+from nscan_cli.calibration.moved_stamps import with_delay
+from nscan_cli.calibration.odometry_delay import checked_delay, said_late
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order
@@ -60,19 +61,19 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     known: KnownSteps = {}
     log, headings = checked_headings(log, reading, options, known)
     log, turned_back = checked_heading_jumps(log, options, known)
-    recorded = log
-    log, units = checked_units(recorded, options.units, options.steps)
-    log, held = checked_held(log, options.held, options.steps)
-    motion, along = _compared(log, reading, options, known), list[str]()
-    if motion.findings or motion.said:
-        # What the scans show may be someone who goes along, and odometry is right without his readings.
-        alone, masked, seen = checked_companion(log, reading, options.companion)
-        without_him = _compared(alone, masked, options, {}) if seen else motion
-        if seen and not without_him.findings and without_him.measured >= options.min_steps:
-            motion, along = without_him, seen
+    recorded, is_given = log, bool(reading.clock_offset)
+    units, held, motion, along = _compared_file(recorded, reading, options, known)
+    offset = 0.0 if is_given else round(sum(finding.clock_offset for finding in motion.findings), 2)
+    if offset:
+        # Whatever else is wrong shows once both are compared at the same times.
+        recorded = with_delay(recorded, offset)
+        units, held, motion, along = _compared_file(recorded, reading, options, known)
     log, reading, signed, known = motion.log, motion.reading, motion.signed, motion.known
     findings, stretched = motion.findings, motion.stretched
-    reversing, late = motion.reversing, motion.late
+    reversing, late = motion.reversing, motion.set_anew
+    if delay := round(offset + motion.delay, 2):
+        reading = replace(reading, clock_offset=round(reading.clock_offset + delay, 2))
+        late = [*late, said_late(delay, reading.clock_offset, "because scans are matched by odometry")]
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
         turned = changed_view(log, reading, options, known)
@@ -121,9 +122,11 @@ class _Compared:
     """The steps that its scans have measured."""
     findings: list[Finding]
     stretched: list[str]
-    """Messages on parts in another scale, on the signs, and on the delay."""
+    """Messages on parts in another scale, on the signs, and on a clock that was set."""
     reversing: list[str]
-    late: list[str]
+    set_anew: list[str]
+    delay: float
+    """s that were added to the stamps of its odometry."""
 
     @property
     def measured(self) -> int:
@@ -131,9 +134,26 @@ class _Compared:
         return sum(step is not None for step in self.known.values())
 
     @property
-    def said(self) -> list[str]:
-        """All messages."""
-        return self.stretched + self.reversing + self.late
+    def is_changed(self) -> bool:
+        """Whether something was put right, or is to be said."""
+        return bool(self.findings or self.stretched or self.reversing or self.set_anew or self.delay)
+
+
+def _compared_file(
+    recorded: LaserLog, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
+) -> tuple[list[str], list[str], _Compared, list[str]]:
+    """Compare a log as it was recorded: messages on units, on odometry that stands, and on someone who goes
+    along, around what is compared then."""
+    log, units = checked_units(recorded, options.units, options.steps)
+    log, held = checked_held(log, options.held, options.steps)
+    motion = _compared(log, reading, options, known)
+    if motion.is_changed:
+        # What the scans show may be someone who goes along, and odometry is right without his readings.
+        alone, masked, seen = checked_companion(log, reading, options.companion)
+        without_him = _compared(alone, masked, options, {}) if seen else motion
+        if seen and not without_him.findings and without_him.measured >= options.min_steps:
+            return units, held, without_him, seen
+    return units, held, motion, []
 
 
 def _compared(
@@ -148,11 +168,11 @@ def _compared(
         findings = find_contradictions(signed, reading, options, known)
     if not any(finding.is_of_clocks for finding in findings):
         log, stretched = checked_stretches(log, options, known)
-    log, reading, late = checked_delay(log, reading, known, options)
-    if late or stretched:
+    log, delay = checked_delay(log, reading, known, options)
+    if delay or stretched:
         signed, reversing = checked_signs(log, options.unsigned, options.steps)
         findings = find_contradictions(signed, reading, options, known)
-    return _Compared(log, reading, signed, known, findings, stretched, reversing, set_anew + late)
+    return _Compared(log, reading, signed, known, findings, stretched, reversing, set_anew, delay)
 
 
 def _mirrored(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:

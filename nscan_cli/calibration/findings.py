@@ -38,6 +38,8 @@ class Finding:
     seen_mount: Array | None = None
     """(3,) the mounting of the laser that the steps show, if odometry is to agree with the scans until the
     cause is known."""
+    clock_offset: float = 0.0
+    """s to add to the stamps of odometry, so that its turns agree with the scans; 0 if none is known."""
     is_of_clocks: bool = False
     """Whether odometry and scans are compared at wrong times before it is put right."""
     is_of_mount: bool = False
@@ -120,6 +122,7 @@ def two_clocks(found: ClockOffset, reading: ReadingOptions) -> Finding:
         f"the clock of odometry is likely {abs(found.offset):.1f} s {side} that of the scans: with this "
         f"offset their turns differ by {found.disagreement:.0%}, as stamped by {found.as_stamped:.0%}; "
         f"try --clock-offset {reading.clock_offset + found.offset:.1f}",
+        clock_offset=found.offset,
         is_of_clocks=True,
     )
 

@@ -10,7 +10,8 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses, moved_odometry
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, Mask
+from nscan_cli.logs.scan_order import nearest_in_time
+from nscan_cli.poses import Array, Mask, are_known
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:
@@ -51,4 +52,8 @@ def _with_moved_stamps(log: LaserLog, moved: Callable[[Array], tuple[Array, Mask
     path = robot_path(at, poses)
     if path is None:
         return log
-    return replace(log, odometry=moved_odometry(log.odometry, path, log.times), odometry_path=path)
+    # Where odometry was left out it stays so, at its own times.
+    there, _ = moved(log.times)
+    order = np.argsort(there, kind="stable")
+    is_known = are_known(log.odometry)[order[nearest_in_time(there[order], log.times)]]
+    return replace(log, odometry=moved_odometry(is_known, path, log.times), odometry_path=path)

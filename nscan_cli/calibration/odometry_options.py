@@ -49,6 +49,9 @@ class DelayOptions:
     file as it is more often."""
     min_turn: float = 0.05
     """Least turn of a step that counts, rad. With a larger value fewer steps count, and each tells more."""
+    map_turn: float = 0.1
+    """Turns of a finished map are counted each time the robot has turned so far, rad. A larger value counts
+    fewer, which take longer."""
     min_turns: int = 12
     """Least number of steps with a turn. A larger value finds less in short drives."""
     max_difference: float = 0.1

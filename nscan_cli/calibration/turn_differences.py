@@ -2,9 +2,40 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps
 from nscan_cli.poses import Array
+
+
+class Turns(NamedTuple):
+    """n turns of the robot by its scans."""
+
+    begins: Array
+    """(n,) time when each begins, s."""
+    ends: Array
+    """(n,) time when it ends, s."""
+    turned: Array
+    """(n,) rad."""
+
+    @classmethod
+    def of_steps(cls, steps: MeasuredSteps, times: Array) -> Turns:
+        """Those of measured steps, from scans that tell where the robot is at `times` (S,), s."""
+        return cls(times[steps.first], times[steps.last], steps.laser[:, 2])
+
+    @classmethod
+    def of_known(cls, known: KnownSteps, times: Array) -> Turns:
+        """Those of the known steps that are not in doubt, in order of their rows."""
+        steps = sorted((*pair, float(step[0][2])) for pair, step in known.items() if step is not None)
+        first, last, turned = np.array(steps).reshape(-1, 3).T
+        return cls(times[first.astype(np.int64)], times[last.astype(np.int64)], turned)
+
+    def of_at_least(self, turn: float) -> Turns:
+        """Those of at least a `turn`, rad."""
+        is_turn = np.abs(self.turned) >= turn
+        return Turns(self.begins[is_turn], self.ends[is_turn], self.turned[is_turn])
 
 
 def turn_differences(

@@ -216,7 +216,7 @@ class LaserLog:
         if odometry is not None:
             path = path or robot_path(self.times, odometry)
             if path is not None:
-                odometry = moved_odometry(odometry, path, times)
+                odometry = moved_odometry(are_known(odometry), path, times)
         beams = BeamTimes(self.beam_times.first - middle, self.beam_times.step)
         return replace(self, times=times, odometry=odometry, odometry_path=path, beam_times=beams)
 

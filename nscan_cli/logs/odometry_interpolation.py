@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.robot_path import RobotPath, poses_at
+from nscan_cli.logs.robot_path import RobotPath, RobotPathOptions, poses_at
 from nscan_cli.logs.scan_order import nearest_in_time, usual_period
-from nscan_cli.poses import Array, are_known, relative, wrap
+from nscan_cli.poses import Array, Mask, relative, wrap
 
 
 @dataclass(frozen=True)
@@ -44,35 +43,42 @@ def interpolated_poses(times: Array, at: Array, poses: Array, name: str, warning
     columns = (poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2]))
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    missing, margin = _fill_gaps(found, times, at, poses), _margin(at)
-    missing |= (times < at[0] - margin) | (times > at[-1] + margin)
+    missing = _fill_gaps(found, times, at, poses) | _is_beyond(times, at, _margin(at))
     if missing.any():
         found[missing] = np.nan
         warnings.append(_missing_notice(missing, times, name))
     return found
 
 
-def moved_odometry(odometry: Array, path: RobotPath, times: Array) -> Array:
-    """The odometry (S, 3) of scans at other `times` (S,), s, by its path: nan where it was, and in gaps.
+def moved_odometry(is_known: Mask, path: RobotPath, times: Array) -> Array:
+    """The odometry (S, 3) of scans at other `times` (S,), s, by its path: nan where none is known (S,), in
+    gaps, and far beyond the first and the last pose, up to which the robot goes on as on the path.
 
     A scan that comes to lie in a gap has no more odometry than if it had been read there: how the robot came
     from one end of a gap to the other is not known.
     """
     found = poses_at(path, times)
-    missing = _fill_gaps(found, times, path.times, path.poses) | ~are_known(odometry)
+    missing = _fill_gaps(found, times, path.times, path.poses) | ~is_known
+    missing |= _is_beyond(times, path.times, RobotPathOptions.longest_step)
     found[missing] = np.nan
     return found
 
 
-def _fill_gaps(found: Array, times: Array, at: Array, poses: Array) -> NDArray[np.bool_]:
+def _fill_gaps(found: Array, times: Array, at: Array, poses: Array) -> Mask:
     """Let the poses `found` (S, 3) at `times` (S,) that lie in gaps be the nearest of poses (P, 3) at (P,).
 
     Returns which (S,) have none near.
     """
     in_gap, nearest = _in_gap(times, at, poses), nearest_in_time(at, times)
     found[in_gap] = poses[nearest[in_gap]]
-    far: NDArray[np.bool_] = in_gap & (np.abs(times - at[nearest]) > _margin(at))
+    far: Mask = in_gap & (np.abs(times - at[nearest]) > _margin(at))
     return far
+
+
+def _is_beyond(times: Array, at: Array, margin: float) -> Mask:
+    """Which of the times (S,) are more than a margin before the first or behind the last of `at` (P,), s."""
+    beyond: Mask = (times < at[0] - margin) | (times > at[-1] + margin)
+    return beyond
 
 
 def _margin(at: Array) -> float:
@@ -80,7 +86,7 @@ def _margin(at: Array) -> float:
     return OdometryGapOptions.beyond * usual_period(at)
 
 
-def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
+def _missing_notice(missing: Mask, times: Array, name: str) -> str:
     """The sentence that says at which scans (S,) odometry is missing; times (S,) in s."""
     gaps = shortened_list([_scans(first, end - 1) for first, end in mask_runs(missing)])
     seconds = float(np.gradient(times)[missing].sum()) if len(times) > 1 else 0.0
@@ -94,12 +100,12 @@ def _scans(first: int, last: int) -> str:
     return f"scan {first}" if first == last else f"scans {first} to {last}"
 
 
-def _in_gap(times: Array, at: Array, poses: Array) -> NDArray[np.bool_]:
+def _in_gap(times: Array, at: Array, poses: Array) -> Mask:
     """(S,) which of the `times` (S,) lie in a gap between two poses (P, 3) at times (P,)."""
     periods = np.diff(at)
     steps = np.abs(relative(poses[1:], poses[:-1]))
     is_gap = periods > OdometryGapOptions.periods * usual_period(at)
     is_gap &= np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > OdometryGapOptions.motion
     after = np.searchsorted(at, times)
-    found: NDArray[np.bool_] = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))
+    found: Mask = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))
     return found

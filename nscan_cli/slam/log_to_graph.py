@@ -86,7 +86,7 @@ def map_log(
 
     drive = map_drive(checked.log, options, threads, progress, checked.reading)
     parameters: dict[str, Any] = {
-        "reading": dataclasses.asdict(checked.reading),
+        "reading": dataclasses.asdict(drive.reading),
         "scan_checks": as_parameters(SCAN_CHECKS),
         "slam": as_parameters(options),
     }

@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nscan_cli.calibration.moved_stamps import with_delay
+from nscan_cli.calibration.odometry_delay import said_late
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.delay_by_map import delay_by_map
 from nscan_cli.slam.odometry_gaps import BridgedGap, bridged_gaps, bridged_gaps_said, with_bridged_gaps
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import LoopProgress, run_slam
@@ -29,6 +32,8 @@ class MappedDrive:
     graph: Graph
     messages: list[str]
     """What was put right."""
+    reading: ReadingOptions
+    """The options that read the log with the clock of its odometry as it is now."""
 
 
 def map_drive(
@@ -38,8 +43,8 @@ def map_drive(
     progress: Callable[[SlamState], LoopProgress] = lambda _state: lambda *_counts: None,
     reading: ReadingOptions = ReadingOptions(),
 ) -> MappedDrive:
-    """Run the loop, and again as long as its map shows a systematic error of the odometry, or the way over
-    gaps of it.
+    """Run the loop, and again as long as its map shows that odometry is late or early, or a systematic error
+    of it, or the way over gaps of it.
 
     `progress` makes what each run reports to. The log was read with `reading`; as recorded, its odometry is
     believed.
@@ -47,9 +52,15 @@ def map_drive(
     limits, total, least = options.systematic_error, None, options.systematic_error.min_length
     runs_left = 0 if reading.as_recorded else limits.max_runs
     gaps: list[BridgedGap] = []
+    said: list[str] = []
+    is_clock_open = not (reading.as_recorded or reading.clock_offset)
     while True:
         state = SlamState.of_log(log, options, threads)
         graph = run_slam(state, progress(state))
+        if is_clock_open and (delay := delay_by_map(log, graph.poses, state.breaks, options.file_check)):
+            is_clock_open, log, reading = False, with_delay(log, delay), replace(reading, clock_offset=delay)
+            said.append(said_late(delay, delay, "because scans are matched by odometry"))
+            continue
         found = systematic_error(graph.poses, log.odometry, state.breaks, limits, least)
         if found is not None and runs_left:
             runs_left, least = runs_left - 1, limits.min_more_length
@@ -59,8 +70,8 @@ def map_drive(
             break
         else:
             log = with_bridged_gaps(log, gaps)
-    said = [] if total is None else [systematic_error_said(total, reading)]
-    return MappedDrive(state, _as_told(graph, gaps), said + bridged_gaps_said(log, gaps))
+    said += [] if total is None else [systematic_error_said(total, reading)]
+    return MappedDrive(state, _as_told(graph, gaps), said + bridged_gaps_said(log, gaps), reading)
 
 
 def _as_told(graph: Graph, gaps: list[BridgedGap]) -> Graph:

@@ -92,8 +92,6 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         r"1\.[12]\d? m .* --end [\d.]+, or --start [\d.]+, with --range-scale 0\.8\d+ .*-scale 1\.[12]\d?",
     ),
     "a third too long": (lambda log: odometry_faults.scaled(log, 1.33), r"try --odometry-scale 0\.7"),
-    "late by 30 s": (lambda log: odometry_faults.late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
-    "early by 2 s": (lambda log: odometry_faults.late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
     "turns by half": (
         lambda log: odometry_faults.turning(log, 0.5),
         r"turns by odometry are 0\.5\d? times.*--no-odometry",

@@ -10,7 +10,7 @@ import pytest
 
 from nscan_cli.calibration.file_check import CheckedFile, checked_file
 from nscan_cli.calibration.moved_stamps import with_delay
-from nscan_cli.calibration.odometry_options import DelayOptions
+from nscan_cli.calibration.odometry_options import ClockOptions, DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -46,7 +46,7 @@ def test_no_lag_is_found_where_there_is_none_or_nobody_asks():
     assert checked(log).messages == []
     late = odometry_faults.late(log, 0.6)
     assert checked_file(late, ReadingOptions(as_recorded=True), FileCheckOptions()).messages == []
-    never = replace(FileCheckOptions(), lag=DelayOptions(least=np.inf))
+    never = replace(FileCheckOptions(), lag=DelayOptions(least=np.inf), clock=ClockOptions(min_offset=np.inf))
     assert not [said for said in checked(late, never).messages if said.startswith("odometry is stamped")]
     backwards = odometry_faults.turning(log, -1.0)
     assert not [said for said in checked(backwards).messages if said.startswith("odometry is stamped")]

@@ -97,7 +97,7 @@ def test_scans_that_come_to_lie_in_a_gap_have_no_odometry():
     kept = np.r_[:20, 60:100]
     path, times = robot_path(kept / 10, poses[kept]), np.array([1.5, 1.9, 6.0, 6.1, 6.5])
     assert path is not None
-    found = moved_odometry(np.zeros((5, 3)), path, times - 0.15)
+    found = moved_odometry(np.full(5, True), path, times - 0.15)
     at = np.array([13.5, 17.5, np.nan, 60.0, 63.5])
     expected = np.stack([0.05 * at, 0.0 * at, 0.0 * at], axis=1)
     expected[3:] += [2.0, 5.0, 1.5]
@@ -107,5 +107,5 @@ def test_scans_that_come_to_lie_in_a_gap_have_no_odometry():
 def test_scans_without_odometry_have_none_at_other_times():
     path = robot_path(np.arange(10) / 10, driven(10))
     assert path is not None
-    found = moved_odometry(np.array([[0.0, 0.0, 0.0], [np.nan] * 3]), path, np.array([0.25, 0.35]))
+    found = moved_odometry(np.array([True, False]), path, np.array([0.25, 0.35]))
     np.testing.assert_allclose(found[:, 0], [0.125, np.nan])
