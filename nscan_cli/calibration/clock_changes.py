@@ -56,17 +56,19 @@ def checked_clock_change(
     """
     if log.odometry is None:
         return log, []
-    change = clock_change(
-        log, Turns.of_known(known, log.middle_times), options.clock_change, options.clock_change.first_turns
-    )
-    if change is None or not change.is_clear(options.clock_change.first_sigmas, options.clock_change):
+    limits, times = options.clock_change, log.middle_times
+    change = clock_change(log, Turns.of_known(known, times), limits, limits.first_turns)
+    if change is None or not change.is_clear(limits.first_sigmas, limits):
         return log, []
     rows = telling_steps(log, options.steps, options.more_steps)
     measure_steps(log, rows, options.steps, known=known)
-    change = clock_change(
-        log, Turns.of_known(known, log.middle_times), options.clock_change, options.clock_change.min_turns
-    )
-    if change is None or not change.is_clear(options.clock_change.sigmas, options.clock_change):
+    return with_one_clock(log, Turns.of_known(known, times), limits)
+
+
+def with_one_clock(log: LaserLog, turns: Turns, options: ClockChangeOptions) -> tuple[LaserLog, list[str]]:
+    """The log with its odometry on one clock, by the turns of its scans, and messages."""
+    change = clock_change(log, turns, options, options.min_turns)
+    if change is None or not change.is_clear(options.sigmas, options):
         return log, []
     by = change.behind - change.before
     # The side that is farther off was set wrongly.

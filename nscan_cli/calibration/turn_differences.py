@@ -37,6 +37,11 @@ class Turns(NamedTuple):
         is_turn = np.abs(self.turned) >= turn
         return Turns(self.begins[is_turn], self.ends[is_turn], self.turned[is_turn])
 
+    def some(self, most: int) -> Turns:
+        """At most so many, spread evenly."""
+        every = max(-(-len(self.turned) // most), 1)
+        return Turns(self.begins[::every], self.ends[::every], self.turned[::every])
+
 
 def turn_differences(
     odometry: tuple[Array, Array], steps: tuple[Array, Array], turned: Array, offsets: Array

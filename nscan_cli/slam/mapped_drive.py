@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nscan_cli.calibration.moved_stamps import with_delay
-from nscan_cli.calibration.odometry_delay import said_late
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.delay_by_map import delay_by_map
+from nscan_cli.slam.clock_by_map import clock_by_map
 from nscan_cli.slam.odometry_gaps import BridgedGap, bridged_gaps, bridged_gaps_said, with_bridged_gaps
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import LoopProgress, run_slam
@@ -53,13 +51,14 @@ def map_drive(
     runs_left = 0 if reading.as_recorded else limits.max_runs
     gaps: list[BridgedGap] = []
     said: list[str] = []
-    is_clock_open = not (reading.as_recorded or reading.clock_offset)
+    clock_runs_left = 0 if reading.as_recorded or reading.clock_offset else options.clock_runs
     while True:
         state = SlamState.of_log(log, options, threads)
         graph = run_slam(state, progress(state))
-        if is_clock_open and (delay := delay_by_map(log, graph.poses, state.breaks, options.file_check)):
-            is_clock_open, log, reading = False, with_delay(log, delay), replace(reading, clock_offset=delay)
-            said.append(said_late(delay, delay, "because scans are matched by odometry"))
+        clock = clock_by_map(log, graph.poses, state.breaks, reading, options.file_check)
+        if clock is not None and clock_runs_left:
+            clock_runs_left -= 1
+            log, reading, said = clock.log, clock.reading, said + clock.messages
             continue
         found = systematic_error(graph.poses, log.odometry, state.breaks, limits, least)
         if found is not None and runs_left:

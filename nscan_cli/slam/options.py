@@ -125,6 +125,9 @@ class SlamOptions:
     """Step 6: which matches are made again from the final poses."""
     degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
     """How certain the length of a way is that no scan tells."""
+    clock_runs: int = 2
+    """How often a drive is mapped again at most with other stamps of its odometry: a clock may be set within
+    the log, and be late besides. With 0 the check of the file alone decides."""
     odometry_gaps: BridgedGapOptions = field(default_factory=BridgedGapOptions)
     """When the drive is mapped again with the way over gaps of its odometry."""
     systematic_error: SystematicErrorOptions = field(default_factory=SystematicErrorOptions)

@@ -29,9 +29,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, relative
 from nscan_cli.slam.consistency.repeated_maps import mirrored
 from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.mapped_drive import map_drive
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import run_slam
-from nscan_cli.slam.state import SlamState
 from tests.data import REAL_LOGS
 from tests.experiments.output import table
 from tests.logs.excerpts import excerpt
@@ -75,16 +74,15 @@ def mapped_path(path: str, every: int, change: str, odometry: bool) -> MappedPat
         return None
     if odometry and log.odometry is None:
         return None
-    log = checked_file(log, reading, FileCheckOptions()).log
-    log = {"": lambda log: log, "mirrored": mirrored, "backwards": backwards}[change](log)
-    state = SlamState.of_log(log, SlamOptions())
-    graph = run_slam(state, lambda scans, keyframes: None)
-    times, poses = np.asarray(log.times), graph.poses
+    checked = checked_file(log, reading, FileCheckOptions())
+    log = {"": lambda log: log, "mirrored": mirrored, "backwards": backwards}[change](checked.log)
+    drive = map_drive(log, SlamOptions(), reading=checked.reading)
+    times, poses = np.asarray(log.times), drive.graph.poses
     if change == "mirrored":
         poses = poses * MIRRORED
     if change == "backwards":
         times, poses = (log.times[0] + log.times[-1] - log.times)[::-1], poses[::-1]
-    return MappedPath(times, poses, len(state.breaks), bool(notices(state)))
+    return MappedPath(times, poses, len(drive.state.breaks), bool(notices(drive.state)))
 
 
 def differences(runs: Sequence[MappedPath]) -> tuple[float, float, float]:

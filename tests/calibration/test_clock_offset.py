@@ -29,8 +29,9 @@ def checked(log: LaserLog, reading: ReadingOptions | None = None) -> CheckedFile
 @pytest.mark.parametrize("has_path", [False, True])
 def test_two_clocks_are_made_one_and_what_is_said_reads_the_file_so(seconds, has_path):
     log = round_scene().record(5).log()
-    assert log.odometry is not None
-    log = replace(log, odometry_path=robot_path(log.times, log.odometry) if has_path else None)
+    odometry = log.odometry
+    assert odometry is not None
+    log = replace(log, odometry_path=robot_path(log.times, odometry) if has_path else None)
     found = checked(with_delay(log, seconds))
     assert found.reading.clock_offset == pytest.approx(-seconds, abs=0.12)
     (said,) = found.messages
@@ -40,7 +41,7 @@ def test_two_clocks_are_made_one_and_what_is_said_reads_the_file_so(seconds, has
     # What another clock said beyond the ends of the scans is lost, unless odometry has its own times.
     lost = 0.0 if has_path else abs(seconds) / float(np.ptp(log.times))
     assert 1.0 - known.mean() == pytest.approx(lost, abs=0.01)
-    off = np.abs(found.log.odometry - log.odometry)[known]
+    off = np.abs(found.log.odometry - odometry)[known]
     assert np.quantile(off[:, :2], 0.9) < 0.03
 
 
