@@ -37,12 +37,15 @@ def checked_by_walls(
     if options.as_recorded or options.angle_increment is not None:
         return directions, []
     beams = beam_counts(raw.ranges, raw.beams)
-    rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
     widest, factor, square = float(np.max(np.abs(directions.step) * (beams - 1))), 1.0, None
+    few, *_ = samples = [np.arange(0, len(beams), max(1, len(beams) // count)) for count in spacing.max_scans]
     # Walls mostly agree with the log, and a few scans show it.
-    if not _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of])):
-        scans = sampled_scans(raw, directions, limits, rows)
-        factor = _factor_of_walls(scans) or _factor_of_parts(scans) or 1.0
+    if not _walls_agree(sampled_scans(raw, directions, limits, few[:: spacing.first_of])):
+        for rows in samples:
+            scans = sampled_scans(raw, directions, limits, rows)
+            factor = _factor_of_walls(scans) or _factor_of_parts(scans) or 1.0
+            if factor != 1.0:
+                break
     is_bent = factor != 1.0
 
     def sample(count: int) -> SampledScans:
@@ -151,9 +154,11 @@ def _factor_of_parts(scans: SampledScans) -> float | None:
     None if it does not, or if other angles to the beams compared tell another one.
     """
     options = BeamSpacingOptions()
+    # If beams are much farther apart than in the log, hardly any wall is as wide as it says.
+    start = _told_factor(scans, options.narrow_half_width) or 1.0
 
     def told(some: SampledScans, half_width: float, min_beams: int) -> float | None:
-        return _settled(lambda width: _most_told(some, width, min_beams), half_width)
+        return _settled(lambda width: _most_told(some, width, min_beams), half_width, start)
 
     factor = told(scans, options.widest_half_width, options.min_beams)
     if factor is None or abs(math.log(factor)) < options.min_small_difference:
@@ -171,12 +176,12 @@ def _factor_of_parts(scans: SampledScans) -> float | None:
     return factor if 2 * agreeing > options.parts else None
 
 
-def _settled(told: Callable[[float], float | None], half_width: float) -> float | None:
+def _settled(told: Callable[[float], float | None], half_width: float, start: float = 1.0) -> float | None:
     """The factor that is `told` once the angle (rad) to the beams compared is right by that factor itself.
 
-    None if none is told, or if it does not settle.
+    It is looked for from `start` on. None if none is told, or if it does not settle.
     """
-    factor = 1.0
+    factor = start
     for _ in range(BeamSpacingOptions.max_rounds):
         found = told(half_width / factor)
         if found is None:

@@ -99,6 +99,9 @@ def length_by_square_walls(
             break
     if len(pairs.excess) < options.min_pairs:
         return None
+    if abs(found.length) > options.longest:
+        # The fit left what was tried: walls are turned by something else.
+        return None
     tolerance = max(options.part_tolerance, options.part_share * abs(found.length))
     agreeing = 0
     for rows in np.array_split(np.arange(len(pairs.excess)), options.parts):

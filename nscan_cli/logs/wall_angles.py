@@ -89,8 +89,9 @@ class BeamSpacingOptions:
     moved: float = 0.01
     """Least median change of the readings between two scans that are tested, as a share: a robot that stands
     sees one scene only. A larger value tests fewer scans."""
-    max_scans: int = 200
-    """Number of scans that are tested. A larger value takes longer."""
+    max_scans: tuple[int, ...] = (200, 1000)
+    """Numbers of scans that are tested: more of them where walls disagree with the log, and few tell another
+    angle. More take longer."""
     first_of: int = 4
     """One in this number of these is tested first; the others are not where walls agree with the log. A
     larger value takes less time."""

@@ -13,6 +13,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import OFFICE_LOG, data_file
 from tests.logs import lines
+from tests.logs.excerpts import excerpt
 from tests.logs.noisy_room import BEAMS, FIRST, STEP, Readings, carmen, readings, recording
 from tests.simulation.faults import beams_apart, mirrored_in
 
@@ -177,4 +178,15 @@ def test_a_real_log_with_a_wrong_step_is_put_right(name, factor, tmp_path):
     log = read_log(str(file))
     assert len(told(log)) == 1
     # CARMEN says for some that 180 beams cover 180°, which one step cannot tell.
+    assert log.angle_increment == pytest.approx(true.angle_increment, rel=0.006)
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.9, 2.0])
+def test_more_scans_are_looked_at_where_few_walls_are_wide(factor, tmp_path):
+    """In narrow corridors with doors 200 scans are too few."""
+    true = excerpt(read_log(str(data_file("mit-killian.log.gz"))), slice(2000, 3800))
+    file = tmp_path / "wrong.log"
+    file.write_bytes(with_own_angles(beams_apart(true, factor)))
+    log = read_log(str(file))
+    assert len(told(log)) == 1
     assert log.angle_increment == pytest.approx(true.angle_increment, rel=0.006)

@@ -8,7 +8,8 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.square_length import SquareLength, length_by_square_walls
-from tests.data import OFFICE_LOG
+from tests.data import OFFICE_LOG, data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation.faults import beams_apart
 
 
@@ -56,3 +57,9 @@ def test_a_view_that_is_nearly_a_whole_turn_tells_nothing():
     """Its angle between beams and its ranges are hardly told apart."""
     ranges = np.full((400, 353), 2.0, np.float32)
     assert length_by_square_walls(ranges, np.full(400, np.radians(1.0)), False) is None
+
+
+def test_a_length_beyond_those_that_were_tried_is_none():
+    """Beams twice as far apart as they are cover a whole turn here, and are taken to be right."""
+    log = excerpt(read_log(str(data_file("mit-killian.log.gz"))), slice(2000, 3800))
+    assert length_by_square_walls(log.ranges, 2.0 * log.angle_increment, True) is None
