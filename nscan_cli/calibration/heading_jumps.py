@@ -16,6 +16,7 @@ from nscan_cli.calibration.findings import UNDONE
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
 from nscan_cli.calibration.odometry_fault_options import HeadingJumpOptions
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.files.text import shortened_list
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, are_known, relative, wrap
@@ -58,16 +59,23 @@ def _turns_across(
 ) -> tuple[float, float] | None:
     """The turn by scans and that by odometry, rad, from a row to another, or from or to one beside them.
 
-    None if scans measure no such step.
+    Where scans measure no such step, as along bare walls that leave the way open, the turn by scans is a
+    rough one. None where odometry is missing.
     """
     assert log.odometry is not None
     is_known = are_known(log.odometry)
-    for begin, end in ((first - before, last + behind) for before in (0, 1) for behind in (0, 1)):
-        if begin >= 0 and end < len(log) and is_known[[begin, end]].all():
-            step = measure_steps(log, (np.array([begin]), np.array([end])), options.steps, known=known)
-            if len(step):
-                return float(step.laser[0, 2]), float(step.odometry(log.odometry)[0, 2])
-    return None
+    pairs = ((first - before, last + behind) for before in (0, 1) for behind in (0, 1))
+    steps = [(np.array([begin]), np.array([end])) for begin, end in pairs if begin >= 0 and end < len(log)]
+    steps = [step for step in steps if is_known[np.concatenate(step)].all()]
+    for step in steps:
+        found = measure_steps(log, step, options.steps, known=known)
+        if len(found):
+            return float(found.laser[0, 2]), float(found.odometry(log.odometry)[0, 2])
+    if not steps:
+        return None
+    seen = scan_turns(log, *steps[0], options.held.scan_turns)
+    turned = relative(log.odometry[steps[0][1]], log.odometry[steps[0][0]])[0, 2]
+    return float(seen[0]), float(turned)
 
 
 def heading_jumps(poses: Array, options: HeadingJumpOptions) -> list[int]:

@@ -51,6 +51,7 @@ DRIVES: dict[str, tuple[Callable[[], LaserLog], int]] = {
     "simulated": (drive, 150),
     "intel": (lambda: real("intel.log.gz", slice(6000, 9000)), 1500),
     "mit-csail": (lambda: real("mit-csail.log.gz", slice(900, 1900)), 500),
+    "mit-killian": (lambda: real("mit-killian.log.gz", slice(2000, 3800)), 1200),
     "urg-corridor-1": (lambda: real("field/urg-corridor-1.bag", slice(None)), 385),
 }
 
