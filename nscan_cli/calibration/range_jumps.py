@@ -141,10 +141,11 @@ def _agree(log: LaserLog, row: int, scale: float, options: FileCheckOptions) -> 
     """Whether the matches with the ranges from a row on divided by a scale agree with each other and with
     odometry, and are better than those of the scans as they are."""
     jumps = options.jumps
-    across = [_ScaledMatch.of(log, *rows, scale, options) for rows in pairs_across(row)]
+    before, behind = (_ScaledMatch.of(log, first, first + 1, 1.0, options) for first in (row - 2, row))
+    # Odometry may be wrong there, and the robot go on as before.
+    across = [_ScaledMatch.of(log, *rows, scale, options, before.step) for rows in pairs_across(row)]
     if any(each.gain <= jumps.min_gain for each in across):
         return False
-    before, behind = (_ScaledMatch.of(log, first, first + 1, 1.0, options) for first in (row - 2, row))
     # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
     if across[0].misfit > max(before.misfit, behind.misfit) + jumps.max_misfit:
         return False
@@ -169,8 +170,8 @@ class _ScaledMatch(NamedTuple):
     """Two scans, matched with the later one divided by a scale."""
 
     gain: float
-    """By how much the energy per point is lower than that of the scans as they are, matched from there on:
-    single things shift where all ranges seem to grow."""
+    """By how much the energy per point is lower than that of the scans as they are, matched from there on,
+    or from another step: single things shift where all ranges seem to grow."""
     step: Array
     """(3,) of the laser, from the earlier scan to the later one."""
     misfit: float
@@ -178,17 +179,24 @@ class _ScaledMatch(NamedTuple):
 
     @classmethod
     def of(
-        cls, log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions
+        cls,
+        log: LaserLog,
+        first: int,
+        last: int,
+        scale: float,
+        options: FileCheckOptions,
+        other: Array | None = None,
     ) -> _ScaledMatch:
-        """The match of two rows, both of which have enough points."""
+        """The match of two rows, both of which have enough points; `other` is another step (3,)."""
         pair_of_scans = scans_to_match(log, first, last, options)
         assert pair_of_scans is not None
         before, behind, start = pair_of_scans
         scaled = match_scans(before, behind / scale, start, options.steps.pair)
-        as_read = match_scans(before, behind, scaled.pose, options.steps.pair)
+        starts = [scaled.pose] if other is None else [scaled.pose, other]
+        as_read = min(match_scans(before, behind, each, options.steps.pair).energy for each in starts)
         x, y, turn = (scaled.pose - start).tolist()
         misfit = math.hypot(x, y) + abs(math.remainder(turn, math.tau))
-        return cls((as_read.energy - scaled.energy) / len(behind), scaled.pose, misfit)
+        return cls((as_read - scaled.energy) / len(behind), scaled.pose, misfit)
 
 
 def lead_one_way(

@@ -14,6 +14,7 @@ from nscan_cli.calibration.range_jumps import RangeJump, checked_ranges, range_j
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from tests.data import data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation import faults, odometry_faults
 from tests.slam.keyframe_drives import round_scene
 
@@ -78,6 +79,12 @@ def test_a_wrong_step_of_odometry_is_no_change():
     for jump in ((0.3, 0.0, 0.0), (0.0, -0.3, 0.1)):
         wrong = odometry_faults.jump(log, len(log) // 2, jump)
         assert checked(wrong)[1] == []
+
+
+def test_odometry_on_another_clock_is_none():
+    """Beside a pause of the laser this odometry says 1.4 m in place of 0.2 m."""
+    log = excerpt(read_log(str(data_file("fr-clinic.log.gz"))), slice(1500, 3300))
+    assert jumps_of(odometry_faults.late(log, 12.0)) == []
 
 
 @pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic"])
