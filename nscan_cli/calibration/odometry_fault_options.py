@@ -142,6 +142,9 @@ class ScaledStretchOptions:
     max_spread: float = 0.2
     """Largest median residual of the logarithms of the factors in a stretch. A larger value finds more, also
     where matches fail."""
+    max_aside: float = 0.5
+    """In a stretch odometry and scans lead the same way as elsewhere, to this angle in the median, rad. A
+    larger value finds more, also where odometry stands and trembles."""
     max_unclear: float = 0.3
     """A step tells on which side of an end it is if its scale is off that side's by this share of the
     difference of both at most. A larger value needs fewer steps, and takes those beside an end for clear."""

@@ -23,7 +23,7 @@ from nscan_cli.calibration.step_sampling import possible_steps, telling_steps
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.poses import Array, Indices, Mask, wrap
 
 PLACES = (0.5, 0.25, 0.75, 0.12, 0.38, 0.62, 0.88)
 """Where a step is measured to narrow down an interval, as shares of it: the next where one tells nothing."""
@@ -87,6 +87,9 @@ def scaled_stretches(log: LaserLog, options: FileCheckOptions, known: KnownSteps
     seconds = log.times[told.last] - log.times[told.first]
     ways = np.hypot(*told.odometry(log.odometry)[:, :2].T)
     speeds = np.log(ways / np.maximum(seconds, np.finfo(float).tiny))
+    aside = np.subtract(
+        *(np.arctan2(each[:, 1], each[:, 0]) for each in (told.odometry(log.odometry), told.laser))
+    )
     found = []
     for begin, end in mask_runs(is_off):
         middle = median(values[begin:end])
@@ -97,6 +100,9 @@ def scaled_stretches(log: LaserLog, options: FileCheckOptions, known: KnownSteps
         # Somebody who goes along changes steps by scans, but not how fast the robot is by odometry.
         faster = median(speeds[begin:end]) - median(speeds[~is_off])
         if not _is_nearer(np.array([-faster]), middle)[0]:
+            continue
+        # Odometry that stands trembles in any direction: multiplied, it does not lead the robot's way.
+        if median(np.abs(wrap(aside[begin:end] - _usual_angle(aside[~is_off])))) > some.max_aside:
             continue
         # Single steps beside it may be off by something else.
         inside = begin + np.flatnonzero(_is_clear(values[begin:end], middle, middle, some))
@@ -111,6 +117,11 @@ def scaled_stretches(log: LaserLog, options: FileCheckOptions, known: KnownSteps
             ends = _border(log, *rows, middle, False, options)
         found.append(ScaledStretch(_scale(middle, some), len(inside), begins, ends))
     return found
+
+
+def _usual_angle(angles: Array) -> float:
+    """The direction of the mean of directions (n,), rad."""
+    return float(np.angle(np.exp(1j * angles).mean()))
 
 
 def _scale(value: float, options: ScaledStretchOptions) -> float:

@@ -9,10 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.odometry_fault_options import ScaledStretchOptions
 from nscan_cli.calibration.odometry_options import DelayOptions
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.scaled_stretches import scaled_stretches
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -119,6 +122,20 @@ def test_the_file_is_believed_where_the_check_is_off_or_nobody_asks():
 def test_nothing_else_is_taken_for_it(fault):
     messages = checked_file(fault(drive()), ReadingOptions(), OPTIONS).messages
     assert not [message for message in messages if message.startswith("from scan")]
+
+
+def test_odometry_that_stands_and_trembles_has_no_scale():
+    """A tenth of a millimetre to the right from scan to scan is no thousandth of the robot's way."""
+    log = odometry_faults.held(drive(), slice(0, 200), False)
+    assert log.odometry is not None
+    moved = log.odometry.copy()
+    moved[:200, 1] -= 1e-4 * np.arange(200)
+    known: KnownSteps = {}
+    log = replace(log, odometry=moved)
+    find_contradictions(log, ReadingOptions(), OPTIONS, known)
+    assert scaled_stretches(log, OPTIONS, known) == []
+    anywhere = replace(OPTIONS, stretches=ScaledStretchOptions(max_aside=np.pi))
+    assert len(scaled_stretches(log, anywhere, known)) == 1
 
 
 def test_somebody_who_leads_does_not_make_odometry_longer():
