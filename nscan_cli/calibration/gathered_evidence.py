@@ -69,7 +69,19 @@ def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions
             never_changes(evidence.poses, options.still)[2]
         ):
             return True
+    if _may_turn_otherwise(evidence, options):
+        return True
     if fit is None:
         return False
     is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor
     return is_odd or is_change(evidence.change, options, options.change.doubt_sigmas)
+
+
+def _may_turn_otherwise(evidence: StepEvidence, options: FileCheckOptions) -> bool:
+    """Whether odometry turns otherwise than the scans, which turn in too few steps to tell how.
+
+    Turns by odometry alone count as well: its clock may be another one.
+    """
+    count, off = evidence.unlike_turns
+    is_off = count >= options.min_turns_unmeasured and off > options.max_turn_error
+    return is_off and evidence.turning < options.min_steps

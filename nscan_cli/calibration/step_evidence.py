@@ -10,6 +10,7 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.robust_fit import median
 from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
 from nscan_cli.logs.expected_sizes import ranges_over_odometry
@@ -32,7 +33,12 @@ class StepEvidence:
         self.laser = self.both.laser
         least = options.steps.min_motion
         self._is_turning = np.abs(self.laser[:, 2]) >= least
-        self._is_moving = _moves(self.laser, least)
+        self._is_moving, driven = _moves(self.laser, least), _moves(self.odometry, options.min_driven)
+        if 2 * int((driven & ~self._is_moving).sum()) > int(driven.sum()):
+            # In ranges that are much too short all motion is small, and in proportion.
+            arm = options.steps.metres_per_radian
+            if explains_positions(fit_mount(self.laser[driven], self.odometry[driven], arm), options):
+                self._is_moving |= driven
 
     @property
     def moving(self) -> int:
@@ -62,6 +68,16 @@ class StepEvidence:
         """The share of the steps with a turn by scans whose turn by odometry is opposite; 0 for none."""
         turns = self.laser[self._is_turning, 2] * self.odometry[self._is_turning, 2]
         return float((turns < 0.0).mean()) if len(turns) else 0.0
+
+    @property
+    def unlike_turns(self) -> tuple[int, float]:
+        """The number of steps with a turn by scans or by odometry, and the median difference of both turns,
+        as a share of the larger one; 0 for none. They may be opposite."""
+        seen, told = np.abs(self.laser[:, 2]), np.abs(self.odometry[:, 2])
+        larger = np.maximum(seen, told)
+        turning = larger >= self.options.steps.min_motion
+        off = np.abs(seen - told)[turning] / larger[turning]
+        return len(off), median(off) if len(off) else 0.0
 
     @property
     def disagreement(self) -> float:
