@@ -12,6 +12,7 @@ from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import TurnFit
+from nscan_cli.calibration.odometry_delay import with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.position_findings import of_opposite_turns, of_positions
 from nscan_cli.calibration.robust_fit import TO_SIGMA
@@ -61,9 +62,13 @@ def find_contradictions(
     if view is not None:
         return [view]
     turns = evidence.turns
-    is_doubtful = evidence.disagreement > options.clock.max_disagreement
-    if turns is not None and (is_doubtful or not turns_agree(turns, options)):
-        found = _of_clocks(log, evidence.steps, reading, options, known)
+    by_turns = turns is not None and (
+        evidence.disagreement > options.clock.max_disagreement or not turns_agree(turns, options)
+    )
+    # Where the robot turns steadily, turns agree at another time as well, and positions do not.
+    is_explained = any(explains_positions(fit, options) for fit in (evidence.fit, evidence.mirrored_fit))
+    if turns is not None and (by_turns or not is_explained):
+        found = _of_clocks(log, evidence.steps, reading, options, known, by_turns)
         if found:
             return found
     unsteady = unsteady_delay(log, evidence, options, known)
@@ -196,12 +201,18 @@ def _place(
 
 
 def _of_clocks(
-    log: LaserLog, steps: MeasuredSteps, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
+    log: LaserLog,
+    steps: MeasuredSteps,
+    reading: ReadingOptions,
+    options: FileCheckOptions,
+    known: KnownSteps,
+    by_turns: bool,
 ) -> list[Finding]:
     """Findings of the odometry's clock: the offset that explains why turns disagree, if there is one.
 
     Few steps can agree at some offset by chance. So if an offset is likely, more steps are measured. Turns of
-    mirrored scans are compared, too.
+    mirrored scans are compared, too. Unless turns disagree by much (`by_turns`), it must explain positions:
+    they disagree for other reasons as well.
     """
     tries = [(sign, clock_offset(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
     signs = [sign for sign, found in tries if found and _is_offset(found, options.clock.first_gain, options)]
@@ -213,7 +224,9 @@ def _of_clocks(
     told = [
         (found.disagreement, sign, found)
         for sign, found in offsets
-        if found and _is_offset(found, options.clock.gain, options)
+        if found
+        and _is_offset(found, options.clock.gain, options)
+        and (by_turns or _explains_all(log, steps, found.offset, options))
     ]
     if not told:
         return []
@@ -222,6 +235,14 @@ def _of_clocks(
         return [findings.two_clocks(best, reading)]
     evidence = "turns by odometry, at that offset, are those by scans the other way round"
     return [findings.two_clocks(best, reading), findings.opposite_turns(evidence, reading, False, False)]
+
+
+def _explains_all(log: LaserLog, steps: MeasuredSteps, offset: float, options: FileCheckOptions) -> bool:
+    """Whether a mounting and a scale explain the positions if `offset` (s) is added to odometry's stamps."""
+    moved = with_delay(log, offset).at_middle_of_sweeps().odometry
+    there = None if moved is None else StepEvidence(log, moved, steps, options)
+    fits = [] if there is None else [there.fit, there.mirrored_fit]
+    return any(explains_positions(fit, options) for fit in fits)
 
 
 def _is_offset(found: ClockOffset, gain: float, options: FileCheckOptions) -> bool:

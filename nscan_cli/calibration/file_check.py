@@ -162,10 +162,15 @@ def _compared(
     """Compare a log; `known` are the steps that its scans have measured already, others are added."""
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
     findings, stretched = find_contradictions(signed, reading, options, known), list[str]()
-    log, set_anew = checked_clock_change(log, known, options)
+    moved, set_anew = checked_clock_change(log, known, options)
     if set_anew:
-        signed, reversing = checked_signs(log, options.unsigned, options.steps)
-        findings = find_contradictions(signed, reading, options, known)
+        signed_anew, reversing_anew = checked_signs(moved, options.unsigned, options.steps)
+        found = find_contradictions(signed_anew, reading, options, known)
+        if any(not finding.corrected.get("odometry", True) for finding in found):
+            # A clock does not explain it: odometry that stands for a while fits best at another time, too.
+            set_anew = []
+        else:
+            log, signed, reversing, findings = moved, signed_anew, reversing_anew, found
     if not any(finding.is_of_clocks for finding in findings):
         log, stretched = checked_stretches(log, options, known)
     log, delay = checked_delay(log, reading, known, options)

@@ -61,6 +61,16 @@ def test_a_late_clock_is_found_though_most_turns_agree():
     assert re.search(r"too late.*--clock-offset -2\.\d", said)
 
 
+@pytest.mark.parametrize("seconds", [2.0, -2.0])
+def test_a_late_clock_is_found_where_the_robot_turns_steadily(seconds):
+    """Turns agree at other times, too, and positions do not, of which some were multiplied by 865."""
+    log = read_log(str(data_file("walker.mcap")))
+    late = odometry_faults.late(replace(log, odometry_path=None), seconds)
+    assert late.odometry is not None
+    (said,) = found(replace(late, odometry=np.round(late.odometry, 4)))
+    assert re.search(r"clock of odometry is likely (1\.9|2\.0|2\.1) s", said)
+
+
 def test_a_late_clock_of_a_mirrored_drive_is_found():
     drive = round_scene().record(5).log()
     late, mirrored = checked(faults.mirrored(odometry_faults.late(drive, 3.0))).messages
