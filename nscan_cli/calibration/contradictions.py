@@ -12,7 +12,7 @@ from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import TurnFit
-from nscan_cli.calibration.odometry_delay import with_delay
+from nscan_cli.calibration.moved_stamps import with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.position_findings import of_opposite_turns, of_positions
 from nscan_cli.calibration.robust_fit import TO_SIGMA

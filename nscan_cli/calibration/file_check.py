@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from nscan_cli.calibration.agreeing_odometry import agreeing
 from nscan_cli.calibration.bearing_jitter import checked_bearings
 from nscan_cli.calibration.changed_odometry import (
     with_mirrored_odometry,
     with_scaled_odometry,
-    with_seen_mount,
 )
 from nscan_cli.calibration.clock_changes import checked_clock_change
 from nscan_cli.calibration.companions import checked_companion
@@ -45,6 +45,8 @@ class CheckedFile:
     companions_checked: bool = False
     """Whether what goes along with the robot was looked for at all scans, by their odometry, or cannot be:
     with a wrong mounting walls seem to be where the robot has been."""
+    has_findings: bool = False
+    """Whether scans contradict the file, by the steps that were measured."""
 
 
 def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> CheckedFile:
@@ -95,18 +97,18 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
     if not is_mirror_image:
         # In the unit of the mounting.
-        log = _agreeing(log, findings)
+        log = agreeing(log, findings)
     said += jitter + order + jumps + headings + turned_back + units + held + stretched + reversing + late
     said += [finding.message for finding in findings] + along
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)
-        return CheckedFile(log, reading, said, is_elsewhere)
+        return CheckedFile(log, reading, said, is_elsewhere, True)
     is_checked = log.odometry is not None and bool(are_known(log.odometry).all())
     if not along:
         log, reading, along = checked_companion(log, reading, options.companion)
         said += along
-    return CheckedFile(log, reading, said, is_checked)
+    return CheckedFile(log, reading, said, is_checked, bool(findings))
 
 
 @dataclass(frozen=True)
@@ -189,16 +191,6 @@ def _mirrored(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
         if finding.seen_mount is not None:
             mount = finding.seen_mount
     return with_mirrored_odometry(log, mount)
-
-
-def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
-    """The log whose odometry agrees with the scans, as findings see it that leave open what is wrong."""
-    for finding in findings:
-        if finding.seen_scale is not None:
-            log = with_scaled_odometry(log, finding.seen_scale)
-        if finding.seen_mount is not None:
-            log = with_seen_mount(log, finding.seen_mount)
-    return log
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

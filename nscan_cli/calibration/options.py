@@ -209,6 +209,9 @@ class FileCheckOptions:
     more_steps: int = 200
     """Number of steps of each half of the sample if turns disagree, to find the offset of the clocks; also
     the limit where scans tell little. More take longer."""
+    map_sigmas: tuple[float, float, float] = (0.02, 0.02, 0.005)
+    """Standard deviations of a step by the finished map, m and rad. Larger values let fewer steps contradict
+    the file."""
     max_share: float = 0.04
     """Largest sample where scans tell little, as outdoors, as a share of the scans. A larger value finds more
     there, and takes longer."""

@@ -84,7 +84,7 @@ def map_log(
 
         return tell
 
-    drive = map_drive(checked.log, options, threads, progress, checked.reading)
+    drive = map_drive(checked.log, options, threads, progress, checked.reading, checked.has_findings)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(drive.reading),
         "scan_checks": as_parameters(SCAN_CHECKS),
