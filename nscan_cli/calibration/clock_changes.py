@@ -101,17 +101,18 @@ def clock_change(log: LaserLog, turns: Turns, options: ClockChangeOptions, least
     before, both = sums[:, least - 1 : len(turned) - least], sums[:, -1:]
     k = int(np.argmin(before.min(axis=0) + (both - before).min(axis=0))) + least
     whole = np.minimum(np.abs(turned), options.max_difference)
-    sides = (off[:, :k], whole[:k]), (off[:, k:], whole[k:])
-    totals = [side.mean(axis=1) for side, _ in sides]
-    best = [int(total.argmin()) for total in totals]
-    if any(place in (0, 2 * count) for place in best):
+    totals = [off[:, :k].mean(axis=1), off[:, k:].mean(axis=1)]
+    if any(int(total.argmin()) in (0, 2 * count) for total in totals):
         return None
+    before_it, behind_it = (parabola_minimum(offsets, total, options.fitted) for total in totals)
+    # Between two offsets that were tried, one of them may disagree more than one that only happens to fit.
+    found = turn_differences(path, (begins, ends), turned, np.array([before_it, behind_it]))
+    of_before, of_behind = np.minimum(found, options.max_difference)
     told = [
-        _TurnsOfSide.of(side[own], side[other], turns)
-        for (side, turns), own, other in zip(sides, best, best[::-1], strict=True)
+        _TurnsOfSide.of(of_before[:k], of_behind[:k], whole[:k]),
+        _TurnsOfSide.of(of_behind[k:], of_before[k:], whole[k:]),
     ]
     at_place = 0.5 * float(ends[k - 1] + begins[k])
-    before_it, behind_it = (parabola_minimum(offsets, total, options.fitted) for total in totals)
     sigmas, lefts, gains = zip(*told, strict=True)
     beside, most = options.unsure_turns, options.longest_unsure
     unsure = (

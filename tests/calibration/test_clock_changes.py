@@ -20,6 +20,10 @@ from nscan_cli.logs.robot_path import robot_path
 from tests.calibration.test_file_check import drive
 from tests.data import data_file
 from tests.simulation import odometry_faults
+from tests.simulation.building import building
+from tests.simulation.drive import Drive
+from tests.simulation.laser import Laser
+from tests.simulation.sweeping import Turning, fine_path, record_swept
 
 
 def set_in(log: LaserLog, seconds: float, begin: float, end: float) -> LaserLog:
@@ -68,6 +72,17 @@ def test_odometry_that_stands_for_a_while_has_one_clock():
     log = read_log(str(data_file("walker.mcap")))
     held = replace(odometry_faults.held(log, slice(30, 61), False), odometry_path=None)
     assert told(held)[1] == []
+
+
+def test_turns_that_are_alike_are_no_clock_that_was_set():
+    """Odometry is 0.02 s early, and turns of a corner are those of the one before, 9.15 s ago: this is a
+    multiple of the interval between the offsets that are tried, and 0.02 s is none."""
+    laser = Laser(541, -np.radians(135), np.radians(0.5), 30.0, resolution=0.001, mount=(0.3, 0.0, 0.0))
+    place = building(1, 1, 113)
+    way = place.crossings([(0, 1), (1, 1), (1, 0), (0, 0), (0, 1)])
+    path = fine_path(way, Drive(speed=1.5, turn_rate=1.5))
+    swept = record_swept("alike", place.world, path, laser, Turning(0.025, 0.025, "last"), 113)
+    assert told(swept.log(stamp="first"))[1] == []
 
 
 def test_odometry_with_times_of_its_own_is_moved_as_well():
