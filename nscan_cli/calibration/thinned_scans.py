@@ -26,7 +26,8 @@ def thinned_scan(log: LaserLog, row: int, options: StepOptions) -> ThinnedScan |
     (beams,) = (ranges <= pair.reach).nonzero()
     if len(beams) < pair.minimum:
         return None
-    beams = beams[:: max(len(ranges) // options.max_beams, 1)]
+    # Outdoors most beams may not return; the others are too few for a match if they are thinned as well.
+    beams = beams[:: max(min(len(ranges) // options.max_beams, -(-len(beams) // options.max_beams)), 1)]
     lengths = ranges[beams].astype(np.float64)
     directions = log.angle_min[row] + log.angle_increment[row] * beams
     points = np.empty((len(beams), 2))
