@@ -42,6 +42,12 @@ def stamp_place(log: LaserLog, stamp: str, delay: float, options: SweepCheckOpti
     return place if left[place] < options.stamp_tolerance * 0.5 * lasts else None
 
 
+def stamp_delays(log: LaserLog, stamp: str) -> list[float]:
+    """How early odometry seems (s) if scans that are read as if at `stamp` are stamped at another beam."""
+    lasts = first_to_last(log)
+    return [(share - BEFORE_STAMP[stamp]) * lasts for place, share in BEFORE_STAMP.items() if place != stamp]
+
+
 def first_to_last(log: LaserLog) -> float:
     """The usual time from the first beam of a scan to the last, s; 0 if all are seen at once."""
     if log.beam_times is None:

@@ -53,14 +53,20 @@ class ScanMotion:
         count = min(scans, len(self.log) // options.scans_apart)
         return np.unique(np.linspace(1, max(len(self.log) - 2, 1), count).astype(np.int64))
 
-    def turning_rows(self, sweep: float, options: SweepCheckOptions, scans: int, most: int) -> Indices:
-        """Rows (n,) of scans in which the robot turns enough during a `sweep` of the laser (s), the fastest
-        first: at most so many, of so many `scans`."""
-        rows = self.spread_rows(options, scans)
+    def rows_beside(self, rows: Indices, most: int) -> Indices:
+        """Other rows (n,) up to so many scans from rows, with a scan on both sides: a turn of the robot
+        takes longer than a scan, so those beside one in a turn are likely in it, too."""
+        near = np.unique((rows[:, None] + np.arange(-most, most + 1)).ravel())
+        inside: Indices = near[(near >= 1) & (near <= len(self.log) - 2)]
+        return np.setdiff1d(inside, rows)
+
+    def turning_rows(self, rows: Indices, sweep: float, options: SweepCheckOptions) -> Indices:
+        """Those of rows in which the robot turns enough during a `sweep` of the laser (s), the fastest
+        first."""
         rates = np.abs(self.rates(rows))
         order = np.argsort(-rates, kind="stable")
         fastest: Indices = rows[order[rates[order] * sweep > options.min_winding]]
-        return fastest[:most]
+        return fastest
 
     def twist(self, row: int) -> Array | None:
         """(3,) velocity of the laser at a row, m/s and rad/s, by the scans on both sides; None in doubt."""
@@ -98,9 +104,11 @@ class ScanMotion:
         reference, scan = self._scan(row), self._scan(row + 1)
         if not 0.0 < seconds <= self.longest_step or reference is None or scan is None:
             return None
-        # A step is about as long as the one before it.
+        # A step is about as long as the one before it. Of a first one the ranges tell the turn.
         before = self._velocities.get(row - 1)
-        start = np.zeros(3) if before is None else before * seconds
+        if before is None:
+            before = np.array([0.0, 0.0, self._rates.get(row + 1, 0.0)])
+        start = before * seconds
         end = match_scans(reference[0], scan[0], start, self.steps.pair)
         if not end.converged or end.overlap < self.steps.min_overlap:
             return None

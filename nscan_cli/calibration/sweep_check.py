@@ -37,19 +37,19 @@ def checked_sweep(
     if longest == 0.0:
         return log, reading, []
     motion, said = ScanMotion.of_log(log, options.steps, options.sweep), list[str]()
-    tried = (0.0, longest, -longest) if told else (0.0, longest, -longest, 0.5 * longest, -0.5 * longest)
+    tried: tuple[float, ...] = (0.0, longest, -longest, 0.5 * longest, -0.5 * longest)
+    if told:
+        tried = _times_beside(log, told, options)
     evidence = sweep_evidence(motion, tried, told, options.sweep)
     if told and evidence.is_little:
         # If the time is short, the robot turns little in it, and the scans still tell.
         finer = replace(options.sweep, min_winding=options.sweep.least_winding)
         evidence = sweep_evidence(motion, tried, told, finer)
-    sharpest = evidence.sharpest
-    certainty = evidence.sigmas(sharpest, told)
-    if sharpest != told and certainty >= options.sweep.sigmas:
-        sweep = sharpest if told else _measured_sweep(log, float(np.copysign(longest, sharpest)), options)
+    sweep, how = _sweep_by_scans(log, evidence, told, options)
+    if sweep != told:
         reading = replace(reading, sweep=round(sweep, DECIMALS) + 0.0)
         log = with_sweep_times(log, np.full(len(log), reading.sweep), reading.stamp)
-        said.append(_said(evidence, told, sweep, certainty))
+        said.append(_said(told, sweep, how))
     delay = sweep_delay(log, motion, options.sweep)
     if delay:
         log, reading, late = _without_delay(log, reading, delay, options)
@@ -57,11 +57,49 @@ def checked_sweep(
     return log, reading, said
 
 
-def _measured_sweep(log: LaserLog, whole: float, options: FileCheckOptions) -> float:
-    """The time of a sweep by the scans, s, if it is not 0; in doubt all of that from scan to scan."""
-    steps = replace(options.steps, max_beams=options.sweep.time.max_beams)
-    found = sweep_time(ScanMotion.of_log(log, steps, options.sweep), abs(whole), options.sweep)
-    return found.believed(whole, abs(whole), options.sweep.sigmas) or whole
+def _times_beside(log: LaserLog, told: float, options: FileCheckOptions) -> tuple[float, ...]:
+    """The times of a sweep to be tried where the file tells one, all in s.
+
+    It may be for readings in the reverse order, or for a laser that sees at once. Or it may be wrong by a
+    factor: a driver counts twice or half the readings, or takes the time from scan to scan for that of the
+    readings in view. A laser that sweeps once a scan takes the time from scan to scan for a whole turn.
+    """
+    between, least = _time_between_scans(log, options), options.sweep.least_factor
+    longer = (2.0 * abs(told), between) if between >= 2.0 * least * abs(told) else (between,)
+    others = [float(np.copysign(each, told)) for each in (0.5 * told, *longer) if each]
+    return 0.0, told, -told, *(each for each in others if max(each / told, told / each) >= least)
+
+
+def _sweep_by_scans(
+    log: LaserLog, evidence: SweepEvidence, told: float, options: FileCheckOptions
+) -> tuple[float, str]:
+    """The time of a sweep by the scans, s, and how they show it; that which the file tells in doubt.
+
+    Two times that differ by a factor are nearly as sharp if the true one is between them. So it is measured
+    as soon as another one of the same sign is likelier than that of the file.
+    """
+    sharpest, limits = evidence.sharpest, options.sweep
+    certainty = evidence.sigmas(sharpest, told)
+    is_other_length = sharpest not in (0.0, -told)
+    if sharpest == told or certainty < (
+        limits.likelier_sigmas if told and is_other_length else limits.sigmas
+    ):
+        return told, ""
+    compared = counted(len(evidence.energies), "pair")
+    how = f"{compared} of scans match better that way, by {certainty:.1f} standard deviations"
+    if not is_other_length and told:
+        return sharpest, how
+    longest = max(abs(told), _time_between_scans(log, options))
+    steps = replace(options.steps, max_beams=limits.time.max_beams)
+    found = sweep_time(ScanMotion.of_log(log, steps, limits), longest, evidence.options)
+    if told:
+        measured = (
+            f"by {counted(found.pairs, 'pair')} of scans it is {found.seconds:.3g} ± {found.sigma:.2g} s"
+        )
+        return found.believed(told, longest, limits.sigmas), measured
+    # There is one, and in doubt it lasts all of the time from scan to scan.
+    whole = float(np.copysign(longest, sharpest))
+    return found.believed(whole, longest, limits.sigmas) or whole, how
 
 
 def _without_delay(
@@ -88,19 +126,23 @@ def _without_delay(
 def _longest_sweep(log: LaserLog, options: FileCheckOptions) -> float:
     """The time from scan to scan, s, if the laser looks around as those do that sweep; else 0."""
     first, last, _ = field_of_view(log)
+    return _time_between_scans(log, options) if abs(last - first) >= options.sweep.min_view else 0.0
+
+
+def _time_between_scans(log: LaserLog, options: FileCheckOptions) -> float:
+    """The time from scan to scan, s, if a laser may turn for so long; else 0."""
     period = float(np.median(np.diff(log.times)))
-    is_wide = abs(last - first) >= options.sweep.min_view
-    return period if is_wide and options.sweep.shortest <= period <= options.sweep.longest else 0.0
+    return period if options.sweep.shortest <= period <= options.sweep.longest else 0.0
 
 
-def _said(evidence: SweepEvidence, told: float, sweep: float, certainty: float) -> str:
-    compared = counted(len(evidence.energies), "pair")
-    pairs = f"{compared} of scans match better that way, by {certainty:.1f} standard deviations"
+def _said(told: float, sweep: float, how: str) -> str:
     flag, order = f"{sweep:.3g}", ", readings in the reverse order" if sweep < 0.0 else ""
     if sweep == 0.0:
         what, flag = "the laser sees all beams at once, though the file has times of beams", "off"
     elif told == 0.0:
         what = f"the laser turns for {abs(sweep):.3g} s{order}, though the file has no times of beams"
+    elif sweep != -told:
+        what = f"the laser turns for {abs(sweep):.3g} s{order}, not for {abs(told):.3g} s as the file says"
     else:
         what = "the readings are in the reverse order of time"
-    return f"{what}: {pairs}; they are read that way, as with --sweep {flag}; --as-recorded believes the file"
+    return f"{what}: {how}; they are read that way, as with --sweep {flag}; --as-recorded believes the file"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.calibration.file_sweep import usual_sweep_time
+from nscan_cli.calibration.file_sweep import first_to_last, stamp_delays, usual_sweep_time
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
@@ -47,26 +47,43 @@ def _best_delay(
 ) -> tuple[float, float]:
     """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
 
-    Also returns the disagreement with it as a share of that without it.
+    It is that of scans stamped at another beam if this is near and fits as well: such a delay may be shorter
+    than one that a clock is blamed for. Also returns the disagreement with the best delay as a share of that
+    without it.
     """
     times, headings = log.middle_times, np.unwrap(path.poses[:, 2])
     count = round(options.longest_delay / options.delay_step)
     delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
+    by_stamp = np.array(stamp_delays(log, log.reading.stamp))
     steps = times[rows - 1], times[rows + 1]
-    off = turn_differences((path.times, headings), steps, turned, delays).mean(axis=1)
+    tried = np.concatenate([delays, by_stamp])
+    off = turn_differences((path.times, headings), steps, turned, tried).mean(axis=1)
+    off, off_by_stamp = off[: len(delays)], off[len(delays) :]
     best = int(np.argmin(off))
     gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
     # At an end of the range the best one may lie beyond.
     if best in (0, 2 * count) or gain > options.delay_gain:
         return 0.0, gain
     delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
+    nearest = int(np.argmin(np.abs(by_stamp - delay)))
+    is_near = abs(by_stamp[nearest] - delay) < 0.25 * first_to_last(log)
+    if is_near and off_by_stamp[nearest] <= options.stamp_excess * off[best]:
+        return float(by_stamp[nearest]), gain
     return (delay if abs(delay) >= options.least_delay else 0.0), gain
 
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
     """Rows of scans in turns, evenly among them."""
-    rows = motion.spread_rows(options, options.scans)
-    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
-    rows = rows[turned > options.min_winding]
+    rows = _in_turns(motion.spread_rows(options, options.scans), motion, options)
+    if len(rows) < options.min_delay_turns:
+        beside = motion.rows_beside(rows, options.scans_beside)
+        rows = np.union1d(rows, _in_turns(beside, motion, options))
     used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
     return used
+
+
+def _in_turns(rows: Indices, motion: ScanMotion, options: SweepCheckOptions) -> Indices:
+    """Those of rows in which the robot turns."""
+    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
+    found: Indices = rows[turned > options.min_winding]
+    return found

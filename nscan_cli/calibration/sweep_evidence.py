@@ -91,13 +91,14 @@ def sweep_evidence(
 def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> bool:
     """Whether the time that the file tells fits better than the others already, or far worse than another.
 
-    Or whether others fit hardly better than it, so that more pairs would not make one certain.
+    Or whether others fit hardly better than it, so that more pairs would not make one certain. Where the file
+    tells a time, another one may be as near to the true one, so a few pairs do not show that.
     """
     pairs, best = len(evidence.energies), evidence.sharpest
     if pairs < options.least_pairs or evidence.is_little:
         return False
     is_decisive, certainty = pairs >= options.least_decisive, evidence.sigmas(best, told)
-    if certainty < options.hopeless_sigmas and (is_decisive or best != told):
+    if certainty < options.hopeless_sigmas and (is_decisive or best != told == 0.0):
         return True
     if best != told and not (is_decisive and certainty >= options.decided_sigmas):
         return False
@@ -116,11 +117,22 @@ def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOpti
 def turning_pairs(
     motion: ScanMotion, sweep: float, options: SweepCheckOptions, scans: int, most: int
 ) -> Iterator[tuple[int, int]]:
-    """Rows of two scans each between which the motion has changed; no scan is first again before all were.
-
-    At most so many are first, of so many `scans`.
+    """Rows of two scans each between which the motion has changed, first those that begin with so many of
+    the fastest turns among so many `scans`. Where there are few turns, scans beside these are among them.
     """
-    fast, shifts = motion.turning_rows(sweep, options, scans, most), np.array(options.shifts)
+    fast = motion.turning_rows(motion.spread_rows(options, scans), sweep, options)
+    if len(fast) < most:
+        beside = motion.rows_beside(fast, options.scans_beside)
+        fast = np.concatenate([fast, motion.turning_rows(beside, sweep, options)])
+    yield from _pairs_of(fast[:most], motion, sweep, options)
+    yield from _pairs_of(fast[most:], motion, sweep, options)
+
+
+def _pairs_of(
+    fast: Indices, motion: ScanMotion, sweep: float, options: SweepCheckOptions
+) -> Iterator[tuple[int, int]]:
+    """Pairs that begin with these rows; no scan is first again before all were."""
+    shifts = np.array(options.shifts)
     for begin in range(len(shifts)):
         # Each scan begins with another shift, and comes to all of them.
         others = fast + shifts[(begin + np.arange(len(fast))) % len(shifts)]

@@ -70,6 +70,9 @@ class SweepCheckOptions:
     """Scans, evenly spread, among which turns are looked for. More find more, and take longer."""
     scans_apart: int = 2
     """At most one in this number of scans is measured. A larger value takes less time in short logs."""
+    scans_beside: int = 6
+    """Scans on each side of one in a turn that are looked at, too, where there are few. More find more and
+    take longer."""
     min_scans: int = 30
     """Shortest log that is checked, scans. A larger value leaves more short logs unchecked."""
     pairs: int = 24
@@ -101,7 +104,7 @@ class SweepCheckOptions:
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot must move differently there and see the same.
     More shifts find more pairs and take longer."""
-    longest_step: float = 0.4
+    longest_step: float = 0.5
     """Longest time between two scans over which motion is measured, s. A larger value uses sparser logs."""
     max_apart: float = 0.6
     """Largest turn between the scans of a pair, rad. A larger value finds more pairs, some of which do not
@@ -113,6 +116,12 @@ class SweepCheckOptions:
     """Least turn of the robot, and least difference of two, where the file has times of beams and fewer than
     `min_pairs` turn by `min_winding`, rad. A smaller value finds shorter times that are wrong, and takes
     longer."""
+    least_factor: float = 1.25
+    """Other times of a sweep are tried that differ from the file's by at least this factor. With a smaller
+    value the file is compared with times that are hardly another one, which takes time."""
+    likelier_sigmas: float = 2.0
+    """The time of a sweep is measured if another length than the file's makes scans sharper by this number of
+    standard deviations. A larger value takes less time, and believes the file more often."""
     min_view: float = math.radians(190.0)
     """Least field of view of a laser that is checked though its file has no times of beams, rad. A smaller
     value also checks lasers that look ahead, which takes time."""
@@ -143,6 +152,9 @@ class SweepCheckOptions:
     """A delay of odometry is due to scans stamped at another beam if that explains it to within this share of
     the time between two such beams. A larger value blames the stamps more often, and the clock of odometry
     less."""
+    stamp_excess: float = 1.3
+    """A beam that scans may be stamped at explains a delay, too, if turns disagree with it by at most this
+    multiple of their least disagreement. A larger value blames the stamps more often."""
     min_delay_turns: int = 15
     """Least number of scans in turns that a delay rests on. A larger value finds less."""
     few_delay_turns: int = 8

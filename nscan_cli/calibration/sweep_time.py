@@ -32,13 +32,14 @@ class SweepTime:
         """The time to use if the file tells one, 0 for none, and scans follow each other in a period, all s.
 
         It is the file's time, unless the scans contradict it by enough standard deviations. No sweep takes
-        longer than the time from scan to scan, or than the file says.
+        longer than the time from scan to scan, or than the file says. Lasers mostly sweep once a scan, or
+        twice where every second one is missing.
         """
         longest = max(period, abs(told))
         value, bound = float(np.clip(self.seconds, -longest, longest)), sigmas * self.sigma
-        for known in (told, -told, 0.0, np.copysign(period, value)):
+        for known in (told, -told, 0.0, np.copysign(period, value), np.copysign(0.5 * period, value)):
             if abs(value - known) <= bound:
-                return known
+                return float(known)
         return value
 
 

@@ -20,7 +20,9 @@ from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import relative
 from tests.benchmarks.lasers import turning
 from tests.data import data_file
+from tests.simulation.building import building
 from tests.simulation.drive import Drive
+from tests.simulation.laser import Laser
 from tests.simulation.office import office_way, office_world
 from tests.simulation.other_forms import swept_mcap
 from tests.simulation.sweeping import SweptRecording, Turning, fine_path, record_swept
@@ -56,6 +58,9 @@ def checked(data: bytes, reading: ReadingOptions | None = None) -> CheckedFile:
     (0.0, 2.8, PERIOD, 0.0, "the laser sees all beams at once, though the file has times of beams"),
     (0.0, 0.8, 0.2 * PERIOD, 0.0, "the laser sees all beams at once, though the file has times of beams"),
     (0.2 * PERIOD, 0.8, 0.2 * PERIOD, None, ""),
+    (PERIOD, 0.5, 0.5 * PERIOD, PERIOD, "the laser turns for 0.2 s, not for 0.1 s as the file says"),
+    (PERIOD, 2.8, 0.5 * PERIOD, PERIOD, "the laser turns for 0.2 s, not for 0.1 s as the file says"),
+    (0.5 * PERIOD, 0.8, PERIOD, 0.5 * PERIOD, "the laser turns for 0.1 s, not for 0.2 s as the file says"),
 ])  # fmt: skip
 def test_the_scans_say_whether_and_how_the_laser_turns(turn, rate, told, used, said):
     found = checked(recording(turn, rate, told))
@@ -82,6 +87,39 @@ def test_a_pair_of_scans_that_slipped_does_not_hide_a_laser_that_turns(seed):
 def test_a_laser_may_turn_for_a_part_of_the_time_from_scan_to_scan():
     found = checked(recording(0.5 * PERIOD, 0.5, 0.0)).reading.sweep
     assert found == pytest.approx(0.5 * PERIOD, rel=0.05)
+
+
+@pytest.mark.parametrize("told", [0.0, 2 * PERIOD, PERIOD])
+def test_every_second_scan_may_be_missing(told):
+    """The laser turns for half of the time from scan to scan; its doubled time of beams was believed."""
+    whole = driven(PERIOD, 1.0)
+    rows = slice(None, None, 2)
+    half = dataclasses.replace(
+        whole, times=whole.times[rows], truth=whole.truth[rows], readings=whole.readings[rows]
+    )
+    found = checked(swept_mcap(half, time_increment=told / BEAMS, scan_time=0.0))
+    assert (found.reading.sweep or told) == pytest.approx(PERIOD, rel=0.05)
+
+
+@pytest.mark.parametrize("told", [0.0, -PERIOD])
+def test_scans_beside_the_few_in_turns_are_compared_too(told):
+    """The robot turns once in two minutes, so that a few of the scans that are spread over the log are
+    of a turn."""
+    place, laser = building(1, 1, 61), turning(BEAMS, 10.0, 0.015, 0.01)
+    way = place.crossings([(0, 0), (1, 0), (1, 1)])
+    path = fine_path(way, Drive(speed=0.25, turn_rate=0.8))
+    drive = record_swept("ring", place.world, path, laser, Turning(), 3)
+    found = checked(swept_mcap(drive, time_increment=told / BEAMS)).reading.sweep
+    assert found == pytest.approx(PERIOD, rel=0.05)
+
+
+@pytest.mark.parametrize("stamp", ["middle", "last"])
+def test_scans_of_a_fast_laser_are_stamped_at_another_beam(stamp):
+    """Half of its sweep is shorter than what a clock is blamed for; headings were off by 4°."""
+    laser = Laser(540, -np.radians(135), np.radians(0.5), 12.0, noise=0.015, resolution=0.001)
+    path = fine_path(office_way()[8:16], Drive(speed=0.8, turn_rate=2.5))
+    drive = record_swept("office", office_world(), path, laser, Turning(1 / 15, 1 / 15, stamp), 5)
+    assert checked(swept_mcap(drive)).reading == ReadingOptions(stamp=stamp)
 
 
 @pytest.mark.parametrize(("rate", "stamp"), list(itertools.product((0.5, 1.5, 2.8), ("middle", "last"))))

@@ -75,6 +75,8 @@ def test_the_file_is_believed_unless_the_scans_contradict_it():
     assert found.believed(0.0, 0.2, 3.0) == -0.143
     assert SweepTime(0.002, 0.004, 60).believed(0.1, 0.1, 3.0) == 0.0
     assert SweepTime(0.0, np.inf, 0).believed(0.1, 0.1, 3.0) == 0.1
+    # Every second scan may be missing.
+    assert SweepTime(-0.107, 0.004, 60).believed(0.2, 0.2, 3.0) == -0.1
 
 
 @pytest.mark.parametrize(("name", "turn", "near"), [
