@@ -121,7 +121,7 @@ def turning_pairs(
     the fastest turns among so many `scans`. Where there are few turns, scans beside these are among them.
     """
     fast = motion.turning_rows(motion.spread_rows(options, scans), sweep, options)
-    if len(fast) < most:
+    if len(fast) < options.pairs:
         beside = motion.rows_beside(fast, options.scans_beside)
         fast = np.concatenate([fast, motion.turning_rows(beside, sweep, options)])
     yield from _pairs_of(fast[:most], motion, sweep, options)

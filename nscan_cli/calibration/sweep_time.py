@@ -6,7 +6,7 @@ energies have a minimum at the true one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,10 @@ def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -
     time = options.time
     count = round(time.reach / time.step)
     sweeps = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
-    energies = _energies(motion, longest, sweeps, options)
+    # Pairs of scans that are spread over the log tell more than as many of the same turns.
+    energies = _energies(motion, longest, sweeps, replace(options, scans_beside=0))
+    if len(energies) < time.min_steady:
+        energies = _energies(motion, longest, sweeps, options)
     pairs = len(energies)
     if pairs < options.min_pairs:
         return SweepTime(0.0, np.inf, pairs)
