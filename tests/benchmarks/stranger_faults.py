@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
-from tests.simulation import faults, odometry_faults
+from tests.simulation import faults, odometry_faults, things_beside
 from tests.simulation.reversing import there_and_back
 from tests.simulation.tilted_laser import tilted
 
@@ -17,7 +17,7 @@ Fault = Callable[[LaserLog], LaserLog]
 
 def _posts(*degrees: tuple[float, float, float]) -> Fault:
     sectors = [(np.radians(first), np.radians(last), distance) for first, last, distance in degrees]
-    return lambda log: faults.own_parts(log, sectors)
+    return lambda log: things_beside.own_parts(log, sectors)
 
 
 def _frozen(log: LaserLog) -> LaserLog:
@@ -204,8 +204,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
     ("a sixth of the beams always says 5 m", lambda log: faults.dead_beams(log, 5.0), "exactly the same"),
     ("tilted, sees the floor 3 m ahead", lambda log: tilted(log, 3.0), "tilted and sees the floor"),
-    ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
-    ("someone leads at 0.6 m", lambda log: faults.leader(log, 0.6), "goes along with the robot"),
+    ("someone follows at 0.6 m", lambda log: things_beside.follower(log, 0.6), "goes along with the robot"),
+    ("someone leads at 0.6 m", lambda log: things_beside.leader(log, 0.6), "goes along with the robot"),
     ("the laser sees nothing for a tenth",
         lambda log: faults.without_returns(log, slice(len(log) // 2, 6 * len(log) // 10), 0.0),
         "sees nothing",
@@ -217,7 +217,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), "stands? for no reading"),
     ("20 % of the readings say 2 m", lambda log: faults.dust(log, 0.2, 2.0), "stands? for no reading"),
     ("noise of 0.1 m on the ranges", lambda log: faults.noisy_ranges(log, 0.1), "beside each other scatter"),
-    ("cart on a hinge", faults.cart, "goes along with the robot"),
+    ("cart on a hinge", things_beside.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
 KNOWN_CURES = {

@@ -23,7 +23,7 @@ from nscan_cli.poses import wrap
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import truth_of
-from tests.simulation import faults, odometry_faults
+from tests.simulation import faults, odometry_faults, things_beside
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 from tests.slam.mapped_logs import mapped, position_rmse
@@ -40,10 +40,10 @@ def drive() -> LaserLog:
 
 
 COMPANIONS: dict[str, Callable[[LaserLog], LaserLog]] = {
-    "follower": lambda log: faults.follower(log, 0.6),
-    "close follower": lambda log: faults.follower(log, 0.4),
-    "leader": lambda log: faults.leader(log, 0.8),
-    "cart": faults.cart,
+    "follower": lambda log: things_beside.follower(log, 0.6),
+    "close follower": lambda log: things_beside.follower(log, 0.4),
+    "leader": lambda log: things_beside.leader(log, 0.8),
+    "cart": things_beside.cart,
 }
 
 
@@ -76,7 +76,11 @@ def test_the_message_has_the_option_that_does_the_same(name):
 
 
 @pytest.mark.parametrize(
-    "fault", [functools.partial(faults.follower, distance=0.4), functools.partial(faults.cart, hitch=0.25)]
+    "fault",
+    [
+        functools.partial(things_beside.follower, distance=0.4),
+        functools.partial(things_beside.cart, hitch=0.25),
+    ],
 )
 def test_the_map_is_right_without_it(fault):
     """A cart on a short bar covers the laser where the robot turns on the spot."""
@@ -87,7 +91,7 @@ def test_the_map_is_right_without_it(fault):
 
 
 def test_a_cart_that_swings_round_the_laser_is_left_out_all_around():
-    log = faults.cart(drive(), hitch=0.3, length=0.6, width=0.6)
+    log = things_beside.cart(drive(), hitch=0.3, length=0.6, width=0.6)
     mask = checked_file(log, ReadingOptions(), FileCheckOptions()).reading.mask or ()
     (reach,) = (sector[2] for sector in mask if sector[:2] == (-np.pi, np.pi))
     assert 0.6 < reach < 0.9
@@ -97,13 +101,13 @@ def test_a_cart_that_swings_round_the_laser_is_left_out_all_around():
 
 def test_a_long_cart_that_swings_through_all_bearings_is_in_one_place():
     """Of the bearings in which scans see it, fewer than two thirds are in one quarter."""
-    log = faults.cart(drive(), hitch=0.4, length=1.0)
+    log = things_beside.cart(drive(), hitch=0.4, length=1.0)
     assert log.odometry is not None
     assert find_companion(log, log.odometry, CompanionOptions()) is not None
 
 
 def test_without_odometry_the_option_is_named():
-    log = replace(faults.follower(drive(), 0.6), odometry=None, odometry_path=None)
+    log = replace(things_beside.follower(drive(), 0.6), odometry=None, odometry_path=None)
     assert checked_file(log, ReadingOptions(), FileCheckOptions()).messages == []
     (said,) = (each for each in notices(mapped(log).state) if "goes along" in each)
     assert "; try --mask 1" in said
@@ -120,7 +124,7 @@ def test_it_is_looked_for_once():
 
 
 def test_sectors_that_are_left_out_already_stay_so():
-    masked = faults.cart(drive())
+    masked = things_beside.cart(drive())
     report = replace(masked.report, masked=((0.5, 0.6),))
     checked = checked_file(replace(masked, report=report), ReadingOptions(), FileCheckOptions())
     assert checked.reading.mask is not None
@@ -135,14 +139,14 @@ def test_somebody_who_leads_is_seen_on_real_logs_and_nobody_else(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
     assert log.odometry is not None
     assert find_companion(log, log.odometry, replace(CompanionOptions(), min_share=0.1)) is None
-    found = find_companion(faults.leader(log, 0.8), log.odometry, CompanionOptions())
+    found = find_companion(things_beside.leader(log, 0.8), log.odometry, CompanionOptions())
     assert found is not None
     assert found.share > 0.5
 
 
 def test_odometry_is_not_blamed_for_somebody_who_leads():
     """Scans of half a turn match best with who is near."""
-    log = faults.leader(read_log(str(data_file("mit-csail.log.gz"))), 0.6)
+    log = things_beside.leader(read_log(str(data_file("mit-csail.log.gz"))), 0.6)
     checked = checked_file(log, ReadingOptions(), FileCheckOptions())
     (message,) = checked.messages
     assert message.startswith("something goes along with the robot")
@@ -152,7 +156,7 @@ def test_odometry_is_not_blamed_for_somebody_who_leads():
 
 def test_nor_if_he_is_so_near_that_most_steps_by_scans_are_his():
     """They contradict odometry, which agrees with the scans without his beams."""
-    log = faults.leader(read_log(str(OFFICE_LOG)), 0.4)
+    log = things_beside.leader(read_log(str(OFFICE_LOG)), 0.4)
     checked = checked_file(log, ReadingOptions(), FileCheckOptions())
     (message,) = checked.messages
     assert message.startswith("something goes along with the robot")
@@ -163,7 +167,7 @@ def test_nor_if_he_is_so_near_that_most_steps_by_scans_are_his():
 def test_nor_are_its_signs_or_a_tilted_laser():
     """Someone ahead stays there, as the floor ahead does, and falls back, as if the robot reversed."""
     whole = read_log(str(data_file("mit-killian.log.gz")))
-    log, options = faults.leader(faults.taken(whole, slice(3500, 7000)), 0.6), FileCheckOptions()
+    log, options = things_beside.leader(faults.taken(whole, slice(3500, 7000)), 0.6), FileCheckOptions()
     assert checked_signs(log, options.unsigned, options.steps)[1]
     assert "the scans stay the same" in find_contradictions(log, ReadingOptions(), options)[0].message
     checked = checked_file(log, ReadingOptions(), options)
@@ -175,7 +179,7 @@ def test_nor_are_its_signs_or_a_tilted_laser():
 
 
 def test_odometry_that_is_wrong_is_not_believed_for_somebody_who_leads():
-    log = faults.mirrored(faults.leader(read_log(str(OFFICE_LOG)), 0.6))
+    log = faults.mirrored(things_beside.leader(read_log(str(OFFICE_LOG)), 0.6))
     messages = checked_file(log, ReadingOptions(), FileCheckOptions()).messages
     assert not messages[0].startswith("something goes along")
 
@@ -201,6 +205,6 @@ def test_walls_beside_a_heading_that_drifts_are_nobody():
 
 
 def test_a_robot_that_hardly_moves_has_no_path():
-    log = faults.taken(faults.cart(drive()), slice(0, 10))
+    log = faults.taken(things_beside.cart(drive()), slice(0, 10))
     assert log.odometry is not None
     assert find_companion(log, log.odometry, CompanionOptions()) is None

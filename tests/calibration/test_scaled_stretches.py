@@ -23,7 +23,7 @@ from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, relative
 from tests.data import data_file
 from tests.logs.excerpts import excerpt
-from tests.simulation import faults, odometry_faults
+from tests.simulation import odometry_faults, things_beside
 from tests.simulation.scenes import office
 
 OPTIONS = FileCheckOptions()
@@ -116,7 +116,7 @@ def test_the_file_is_believed_where_the_check_is_off_or_nobody_asks():
         lambda log: odometry_faults.scaled(log, 0.01),
         lambda log: odometry_faults.scaled_in(log, 1.5, slice(200, 400)),
         lambda log: odometry_faults.held(log, slice(200, 400), False),
-        lambda log: faults.leader(log, 0.6),
+        lambda log: things_beside.leader(log, 0.6),
     ],
 )
 def test_nothing_else_is_taken_for_it(fault):
@@ -140,6 +140,6 @@ def test_odometry_that_stands_and_trembles_has_no_scale():
 
 def test_somebody_who_leads_does_not_make_odometry_longer():
     """Over a part of this drive most steps by scans are his, a fifth of those by odometry."""
-    log = faults.leader(read_log(str(data_file("mit-csail.log.gz"))), 0.6)
+    log = things_beside.leader(read_log(str(data_file("mit-csail.log.gz"))), 0.6)
     messages = checked_file(log, ReadingOptions(), OPTIONS).messages
     assert not [message for message in messages if message.startswith("from scan")]

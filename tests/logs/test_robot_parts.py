@@ -19,7 +19,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import compose
 from tests.data import data_file
-from tests.simulation import faults
+from tests.simulation import faults, things_beside
 from tests.simulation.laser import Laser
 from tests.simulation.recording import record
 from tests.simulation.scenes import office
@@ -52,7 +52,7 @@ def sectors(*degrees: tuple[float, float, float]) -> list[tuple[float, float, fl
 
 def check(log: LaserLog, parts: list[tuple[float, float, float]]) -> None:
     """Every part is found, and no more than 2.5° beyond it."""
-    there = found(faults.own_parts(log, parts))
+    there = found(things_beside.own_parts(log, parts))
     assert len(there) == len(parts)
     for sector, (first, last, distance) in zip(there, parts, strict=True):
         assert first - math.radians(2.5) <= sector.first <= first
@@ -77,13 +77,13 @@ def test_posts_wheels_and_a_cart_are_found(parts):
 @pytest.mark.parametrize("noise", [0.0, 0.015])
 def test_whatever_the_noise(noise):
     parts = sectors((43, 63, 0.3))
-    (sector,) = found(faults.own_parts(office_log(), parts, noise))
+    (sector,) = found(things_beside.own_parts(office_log(), parts, noise))
     assert sector.first <= parts[0][0]
     assert parts[0][1] <= sector.last
 
 
 def test_a_laser_of_half_a_turn_that_counts_clockwise():
-    log = faults.own_parts(office_log(Laser()), sectors((-60, -40, 0.3)))
+    log = things_beside.own_parts(office_log(Laser()), sectors((-60, -40, 0.3)))
     clockwise = dataclasses.replace(
         log,
         ranges=np.ascontiguousarray(log.ranges[:, ::-1]),
@@ -127,7 +127,7 @@ def test_walls_half_a_metre_aside_are_none():
 def test_without_a_turn_nothing_is_told():
     straight = faults.taken(narrow(1), slice(0, 105))
     assert found(straight) == []
-    assert found(faults.own_parts(straight, sectors((30, 40, 0.3)))) == []
+    assert found(things_beside.own_parts(straight, sectors((30, 40, 0.3)))) == []
 
 
 def test_in_a_narrow_corridor_posts_are_found_and_walls_are_not():
@@ -151,7 +151,7 @@ def as_carmen(tmp_path, log: LaserLog) -> str:
 
 
 def test_a_log_is_read_without_them_and_says_so(tmp_path):
-    log = faults.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))
+    log = things_beside.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))
     path = as_carmen(tmp_path, log)
     read = read_log(path)
     (said,) = read.report.contradictions
@@ -167,7 +167,7 @@ def test_a_log_is_read_without_them_and_says_so(tmp_path):
 
 
 def test_of_several_lasers_it_is_said_which_one(tmp_path):
-    path = Path(as_carmen(tmp_path, faults.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))))
+    path = Path(as_carmen(tmp_path, things_beside.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))))
     other = [line.replace("FLASER", "RLASER") for line in path.read_text().splitlines() if "FLASER" in line]
     path.write_text("\n".join([path.read_text(), *other]))
     (said,) = read_log(str(path), ReadingOptions(laser="FLASER")).report.contradictions
@@ -175,7 +175,7 @@ def test_of_several_lasers_it_is_said_which_one(tmp_path):
 
 
 def test_the_options_decide(tmp_path):
-    log = faults.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))
+    log = things_beside.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))
     path = as_carmen(tmp_path, log)
     as_recorded = read_log(path, ReadingOptions(as_recorded=True))
     assert as_recorded.report.contradictions == ()

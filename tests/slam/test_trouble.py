@@ -19,7 +19,7 @@ from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.log_to_graph import map_log
 from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
-from tests.simulation import faults
+from tests.simulation import things_beside
 from tests.simulation.scenes import office
 from tests.slam import trouble_cases
 from tests.slam.keyframe_drives import round_scene
@@ -194,7 +194,7 @@ def test_the_map_is_right_though_the_robot_has_itself_in_view(tmp_path):
     """What the check has found stands in the graph. Without it the posts are a few points near the robot."""
     scene = office()
     recording = scene.record_at(scene.truth()[:900], seed=3)
-    seen = faults.own_parts(recording.log(), [(-1.05, -0.7, 0.3), (0.7, 1.05, 0.3)])
+    seen = things_beside.own_parts(recording.log(), [(-1.05, -0.7, 0.3), (0.7, 1.05, 0.3)])
     readings = np.where(np.isfinite(seen.ranges), seen.ranges, recording.readings)
     path = tmp_path / "posts.log"
     path.write_bytes(dataclasses.replace(recording, readings=readings).carmen())

@@ -11,7 +11,7 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 from tests.logs.excerpts import truth_of
-from tests.simulation import faults, odometry_faults
+from tests.simulation import faults, odometry_faults, things_beside
 from tests.simulation.scenes import Scene, office
 from tests.simulation.world import Builder
 from tests.slam.keyframe_drives import path_of
@@ -119,11 +119,11 @@ BESIDE = np.array([(9.0, 7.0, 31.0, 8.0)])
 
 
 def passing_people(log: LaserLog) -> Case:
-    return _throughout(faults.people(log, PASSING))
+    return _throughout(things_beside.people(log, PASSING))
 
 
 def someone_beside(log: LaserLog) -> Case:
-    return _throughout(faults.people(log, BESIDE))
+    return _throughout(things_beside.people(log, BESIDE))
 
 
 def glass(log: LaserLog) -> Case:

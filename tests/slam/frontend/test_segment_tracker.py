@@ -23,7 +23,7 @@ from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import HARD
 from tests.data import data_file
 from tests.logs.excerpts import excerpt, truth_of
-from tests.simulation import faults
+from tests.simulation import faults, things_beside
 from tests.simulation.drive import Odometry
 from tests.simulation.places import drive_through, grounds
 from tests.slam.keyframe_drives import round_scene
@@ -146,6 +146,6 @@ def test_a_crowd_about_a_robot_that_stands_breaks_no_track(seed):
         walker[:2] = truth_of(log)[200, :2] + away * np.array([np.cos(angle), np.sin(angle)])
         walker[2:] = walker[:2] + draw.normal(0.0, 1.2, 2)
     ranges = log.ranges.copy()
-    ranges[210:270] = faults.people(log, walkers, speed=0.6).ranges[210:270]
+    ranges[210:270] = things_beside.people(log, walkers, speed=0.6).ranges[210:270]
     assert np.mean(ranges[210:270] < log.ranges[210:270] - 0.1) > 0.5
     assert breaks_of(replace(log, ranges=ranges)) == []
