@@ -172,17 +172,21 @@ def _kept(ranges: NDArray[np.float32], medians: NDArray[np.float32]) -> NDArray[
 def turning_scans(table: ScanTable, bearings: Array, constant: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Places (n,) of scans in which the other beams show a turn of the robot; none if it turns too seldom."""
     options = RobotPartsOptions()
-    found = []
+    found = np.zeros((0, 2), dtype=np.int64)
     for lag in options.lags:
+        # In a longer time the robot mostly drives straight on before a turn, and behind it, between walls
+        # that are as far away.
+        if len(found) >= options.min_pairs:
+            break
         first = evenly(len(table.times), options.pairs)
         second = np.searchsorted(table.times, table.times[first] + lag)
         inside = second < len(table.times)
         pairs = np.stack([first[inside], second[inside]], axis=1)
         turns = _turns(table, bearings, constant, pairs)
-        found.append(pairs[np.abs(turns) >= options.min_turn])
-    first, last = np.concatenate(found).T
-    if len(first) < options.min_pairs:
+        found = np.concatenate([found, pairs[np.abs(turns) >= options.min_turn]])
+    if len(found) < options.min_pairs:
         return np.zeros(0, dtype=np.int64)
+    first, last = found.T
     return np.unique(np.linspace(first, last, options.scans_of_turn).astype(np.int64))
 
 

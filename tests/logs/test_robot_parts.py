@@ -20,6 +20,8 @@ from nscan_cli.logs.robot_parts import ScanTable, Sector, robot_parts
 from nscan_cli.poses import compose
 from tests.data import data_file
 from tests.simulation import faults, things_beside
+from tests.simulation.building import building, drive
+from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.recording import record
 from tests.simulation.scenes import office
@@ -238,3 +240,14 @@ def test_posts_in_real_logs(name, distance):
 def test_the_recordings_of_strangers(name):
     log = read_log(str(data_file(f"strangers/{name}.mcap")))
     assert "--mask -1" in log.report.contradictions[0]
+
+
+@pytest.mark.parametrize("seed", [100, 112, 141])
+def test_walls_of_a_corridor_before_a_corner_and_behind_it_are_no_parts(seed):
+    """Both corridors are as wide, and a turn is short: most scans around it see walls at one distance."""
+    laser = Laser(360, -math.pi / 2, math.pi / 359, 10.0, resolution=0.001, mount=(0.3, 0.0, 0.0))
+    place = building(1, 1, seed)
+    waypoints = place.crossings([(1, 1), (0, 1), (0, 0), (1, 0), (1, 1), (1, 0), (0, 0)])
+    log = drive(place, waypoints, "building", 700, laser, Drive(0.8, 1.2, 0.1), seed).log()
+    assert log.report.masked == ()
+    assert robot_parts(table_of(log)) == []
