@@ -20,7 +20,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.turn_differences import Turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask, are_known
 
 
 class ClockByMap(NamedTuple):
@@ -42,7 +42,7 @@ def clock_by_map(
     """
     if log.odometry is None:
         return None
-    turns = turns_of_map(log.times, poses, breaks, options)
+    turns = turns_of_map(log.times, poses, breaks, are_known(log.odometry), options)
     # A clock that was set tells an offset between both, too.
     log, said = with_one_clock(log, turns.some(2 * options.more_steps), options.clock_change)
     if said:
@@ -55,13 +55,20 @@ def clock_by_map(
     return ClockByMap(with_delay(log, delay), reading, said)
 
 
-def turns_of_map(times: Array, poses: Array, breaks: Sequence[int], options: FileCheckOptions) -> Turns:
-    """The turns of poses (S, 3) at times (S,), s: one after another, each of about the least that counts."""
+def turns_of_map(
+    times: Array, poses: Array, breaks: Sequence[int], is_known: Mask, options: FileCheckOptions
+) -> Turns:
+    """The turns of poses (S, 3) at times (S,), s: one after another, each of about the least that counts.
+
+    None leads over a break, or over rows at which odometry is not known (S,).
+    """
     headings = np.unwrap(poses[:, 2])
     turned = np.append(0.0, np.cumsum(np.abs(np.diff(headings))))
     ends = np.flatnonzero(np.diff(np.floor(turned / options.lag.map_turn), prepend=-1.0) > 0.0)
     first, last = ends[:-1], ends[1:]
     segments = np.searchsorted(np.asarray(breaks), ends, side="right")
-    kept = (times[last] - times[first] <= options.steps.max_duration) & (np.diff(segments) == 0)
+    unknown = np.append(0, np.cumsum(~is_known))
+    kept = (np.diff(segments) == 0) & (unknown[last + 1] == unknown[first])
+    kept &= times[last] - times[first] <= options.steps.max_duration
     first, last = first[kept], last[kept]
     return Turns(times[first], times[last], headings[last] - headings[first])

@@ -68,13 +68,15 @@ def test_turns_lead_over_no_break_and_no_gap():
     times[120:] += 5.0
     headings = 0.03 * np.arange(200.0)
     poses = np.column_stack([np.zeros((200, 2)), wrap(headings)])
-    turns = turns_of_map(times, poses, [50, 77], OPTIONS)
+    is_known = np.full(200, True)
+    is_known[160:165] = False
+    turns = turns_of_map(times, poses, [50, 77], is_known, OPTIONS)
     np.testing.assert_allclose(turns.turned, 0.3 * (turns.ends - turns.begins), atol=1e-9)
     assert (turns.turned >= 0.06).all()
     assert (turns.turned <= 0.16).all()
-    for at in (4.95, 7.65, 14.0):
+    for at in (4.95, 7.65, 14.0, 21.2):
         assert not ((turns.begins < at) & (at < turns.ends)).any()
-    assert len(turns.turned) >= 200 * 0.03 / 0.1 - 5
+    assert len(turns.turned) >= 200 * 0.03 / 0.1 - 7
 
 
 def test_a_drive_whose_check_told_no_delay_is_mapped_again_with_it():
