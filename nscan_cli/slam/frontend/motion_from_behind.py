@@ -86,9 +86,11 @@ def motion_from_behind(
         whole, ends = _with_ends(first, end), _with_ends(first - since, end - since)
         turns = [np.abs(wrap(np.diff(each[:, 2]))).max() for each in (found.poses[whole], poses[ends])]
         tells = found.weakest_sigmas[first:end] <= options.scan.degeneracy.trusted_sigma
+        # Ripples lead on as well as they hold: what fits as well is no faster than the robot ever goes.
+        is_fast = way > _fastest(found.poses, range(1, count), options) * (end - first)
         # What a robot sees that turns far is new, so that its turn, too, may be wrong from both sides. Where
         # most scans tell their place, they fit badly, and what fits better may be at a wrong place.
-        if is_clear or (max(turns) <= options.standstill_turn and tells.mean() < 0.5):
+        if is_clear or (max(turns) <= options.standstill_turn and tells.mean() < 0.5 and not is_fast):
             motion.poses[whole], motion.weakest_sigmas[whole] = poses[ends], sigmas[ends]
             motion.unproven.extend([] if is_clear else [(first, end)])
     return motion if np.isfinite(motion.poses).any() else None
@@ -167,9 +169,7 @@ def _standing_part(
     A stretch of all scans may be one of a short log, with the highest speed in it.
     """
     first, end = stretch
-    run, others = options.velocity_scans, range(1, len(poses)) if end - first == len(poses) else others
-    starts = range(others.start, others.stop - run + 1)
-    fastest = max((_way(poses, at, at + run) / run for at in starts), default=0.0)
+    fastest = _fastest(poses, range(1, len(poses)) if end - first == len(poses) else others, options)
     begins, lag, most, part = first, 0.0, 0.0, None
     for k in range(first, end):
         if lag <= 0.0:
@@ -180,6 +180,13 @@ def _standing_part(
     if part is None or fastest * (part[1] - part[0]) - _way(poses, *part) <= options.standstill_lag:
         return None
     return part
+
+
+def _fastest(poses: Array, scans: range, options: TrackingOptions) -> float:
+    """The largest way of a scan, m, in the mean of `velocity_scans` among these scans."""
+    run = options.velocity_scans
+    starts = range(scans.start, scans.stop - run + 1)
+    return max((_way(poses, at, at + run) / run for at in starts), default=0.0)
 
 
 def _way(poses: Array, first: int, end: int) -> float:

@@ -14,7 +14,10 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.consistency.repeated_maps import mirrored
 from nscan_cli.slam.diagnostics.notices import notices
-from tests.benchmarks.lasers import KINDS, NONE, recorded, rms, turning
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
+from tests.benchmarks.lasers import HARD, KINDS, NONE, recorded, rms, turning
 from tests.simulation.drive import Drive, Odometry
 from tests.simulation.drive import poses as driven
 from tests.simulation.faults import taken
@@ -153,3 +156,13 @@ def test_a_robot_that_drives_on_after_a_stop_in_a_bare_corridor_does_not_go_slow
     ways = [np.linalg.norm(each[50:, :2] - each[:-50, :2], axis=1) for each in (found, truth)]
     assert np.abs(ways[0] - ways[1]).max() < 0.25
     assert rms(found, truth) < 0.1
+
+
+def test_what_only_fits_as_well_from_behind_is_no_faster_than_the_robot_ever_goes():
+    """At 0.2 m/s in a bare corridor a ripple led it 25 m in 20 s."""
+    log, truth = recorded(HARD[0], 1, NONE)
+    rows = slice(4000, 5500)
+    part = dataclasses.replace(excerpt(log, rows), odometry=None, odometry_path=None)
+    poses = run_slam(SlamState.of_log(part, SlamOptions()), lambda *_counts: None).poses
+    ways, true = (np.hypot(*(each[200:] - each[:-200])[:, :2].T) for each in (poses, truth[rows]))
+    assert ways.max() < 1.1 * true.max()
