@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.calibration import findings, mount_findings
+from nscan_cli.calibration import clock_findings, findings, mount_findings
 from nscan_cli.calibration.clock_offset import ClockOffset, clock_offset
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
@@ -231,10 +231,11 @@ def _of_clocks(
     if not told:
         return []
     _, sign, best = min(told)
+    clocks = clock_findings.two_clocks(best, reading)
     if sign > 0.0:
-        return [findings.two_clocks(best, reading)]
+        return [clocks]
     evidence = "turns by odometry, at that offset, are those by scans the other way round"
-    return [findings.two_clocks(best, reading), findings.opposite_turns(evidence, reading, False, False)]
+    return [clocks, findings.opposite_turns(evidence, reading, False, False)]
 
 
 def _explains_all(log: LaserLog, steps: MeasuredSteps, offset: float, options: FileCheckOptions) -> bool:

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from nscan_cli.calibration.clock_offset import ClockOffset
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_delay import TurnDelay
 from nscan_cli.calibration.odometry_options import DelayOptions
@@ -113,18 +112,6 @@ def mirrored_instead(reading: ReadingOptions) -> str:
 
 def _unused(evidence: str, cure: str = "") -> Finding:
     return Finding(f"{evidence}; it is not used; {UNDONE}{cure}", {"odometry": False})
-
-
-def two_clocks(found: ClockOffset, reading: ReadingOptions) -> Finding:
-    """Odometry is stamped by another clock."""
-    side = "behind" if found.offset > 0 else "ahead of"
-    return Finding(
-        f"the clock of odometry is likely {abs(found.offset):.1f} s {side} that of the scans: with this "
-        f"offset their turns differ by {found.disagreement:.0%}, as stamped by {found.as_stamped:.0%}; "
-        f"try --clock-offset {reading.clock_offset + found.offset:.1f}",
-        clock_offset=found.offset,
-        is_of_clocks=True,
-    )
 
 
 def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool, is_mended: bool) -> Finding:

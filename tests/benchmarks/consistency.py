@@ -76,7 +76,7 @@ def mapped_path(path: str, every: int, change: str, odometry: bool) -> MappedPat
         return None
     checked = checked_file(log, reading, FileCheckOptions())
     log = {"": lambda log: log, "mirrored": mirrored, "backwards": backwards}[change](checked.log)
-    drive = map_drive(log, SlamOptions(), reading=checked.reading)
+    drive = map_drive(log, SlamOptions(), reading=checked.reading, has_findings=checked.has_findings)
     times, poses = np.asarray(log.times), drive.graph.poses
     if change == "mirrored":
         poses = poses * MIRRORED

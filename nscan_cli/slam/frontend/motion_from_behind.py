@@ -75,6 +75,7 @@ def motion_from_behind(
     sigmas = np.where(tells, sigmas, np.maximum(sigmas, from_front.weakest_sigmas))
     sigmas = np.where(is_turn, from_front.weakest_sigmas, sigmas)
     motion = MotionFromBehind(np.full((count, 3), np.nan), np.zeros(count), [])
+    fastest = _fastest(found.poses, range(1, count), options)
     for first, end in stretches:
         way = _way(poses, first - since, end - since)
         share = float(inliers[first - since : end - since].mean())
@@ -87,7 +88,7 @@ def motion_from_behind(
         turns = [np.abs(wrap(np.diff(each[:, 2]))).max() for each in (found.poses[whole], poses[ends])]
         tells = found.weakest_sigmas[first:end] <= options.scan.degeneracy.trusted_sigma
         # Ripples lead on as well as they hold: what fits as well is no faster than the robot ever goes.
-        is_fast = way > _fastest(found.poses, range(1, count), options) * (end - first)
+        is_fast = way > fastest * (end - first)
         # What a robot sees that turns far is new, so that its turn, too, may be wrong from both sides. Where
         # most scans tell their place, they fit badly, and what fits better may be at a wrong place.
         if is_clear or (max(turns) <= options.standstill_turn and tells.mean() < 0.5 and not is_fast):
