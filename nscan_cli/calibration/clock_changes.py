@@ -40,10 +40,14 @@ class ClockChange(NamedTuple):
     more; each is capped."""
     gain: float
     """This sum as a share of that with the offset of the other side, of the side where it is more."""
+    disagreement: float
+    """That sum with the offset of the other side, as a share of the turns by scans, of the side where it is
+    less."""
 
     def is_clear(self, sigmas: float, options: ClockChangeOptions) -> bool:
         """Whether both sides tell their own offset, by so many standard deviations."""
         is_told = self.left <= options.max_left and self.gain <= options.max_gain and self.sigmas >= sigmas
+        is_told &= self.disagreement >= options.min_disagreement
         return is_told and abs(self.behind - self.before) >= options.least
 
 
@@ -113,13 +117,14 @@ def clock_change(log: LaserLog, turns: Turns, options: ClockChangeOptions, least
         _TurnsOfSide.of(of_behind[k:], of_before[k:], whole[k:]),
     ]
     at_place = 0.5 * float(ends[k - 1] + begins[k])
-    sigmas, lefts, gains = zip(*told, strict=True)
+    sigmas, lefts, gains, disagreements = zip(*told, strict=True)
     beside, most = options.unsure_turns, options.longest_unsure
     unsure = (
         max(float(ends[max(k - 1 - beside, 0)]), at_place - most),
         min(float(begins[min(k + beside, len(begins) - 1)]), at_place + most),
     )
-    return ClockChange(at_place, unsure, before_it, behind_it, min(sigmas), max(lefts), max(gains))
+    worst = min(sigmas), max(lefts), max(gains), min(disagreements)
+    return ClockChange(at_place, unsure, before_it, behind_it, *worst)
 
 
 class _TurnsOfSide(NamedTuple):
@@ -128,11 +133,13 @@ class _TurnsOfSide(NamedTuple):
     sigmas: float
     left: float
     gain: float
+    disagreement: float
 
     @classmethod
     def of(cls, own: Array, other: Array, turns: Array) -> _TurnsOfSide:
         """From the differences (n,) with its offset and with the other side's, and the turns (n,), rad."""
         more = other - own
         sigma = max(float(more.std(ddof=1)), 1e-9) / len(more) ** 0.5
-        off = float(own.sum())
-        return cls(float(more.mean()) / sigma, off / float(turns.sum()), off / max(float(other.sum()), 1e-9))
+        off, off_there, all_turns = float(own.sum()), float(other.sum()), float(turns.sum())
+        gain = off / max(off_there, 1e-9)
+        return cls(float(more.mean()) / sigma, off / all_turns, gain, off_there / all_turns)

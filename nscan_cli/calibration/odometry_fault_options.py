@@ -58,6 +58,10 @@ class ClockChangeOptions:
     max_gain: float = 0.85
     """A side disagrees with its own offset by at most this share of its disagreement with that of the other.
     A larger value finds more, also by chance."""
+    min_disagreement: float = 0.1
+    """Least disagreement of the turns of a side with the offset of the other, as a share of the turns by
+    scans. A turn at a steady rate fits at other times, too, and noise decides where. A larger value finds
+    less."""
     first_sigmas: float = 1.3
     """More steps are measured where the first few gain so much on both sides, in standard deviations. A
     larger value takes less time, and finds less."""

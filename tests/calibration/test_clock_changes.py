@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.clock_changes import ClockChange
+from nscan_cli.calibration.clock_changes import ClockChange, clock_change
 from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.calibration.moved_stamps import with_moved_part
 from nscan_cli.calibration.odometry_fault_options import ClockChangeOptions
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.turn_differences import Turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -101,7 +102,7 @@ def test_odometry_with_times_of_its_own_is_moved_as_well():
 
 
 def test_both_sides_must_tell_it():
-    clear = ClockChange(10.0, (9.0, 11.0), 0.0, 1.0, 5.0, 0.2, 0.3)
+    clear = ClockChange(10.0, (9.0, 11.0), 0.0, 1.0, 5.0, 0.2, 0.3, 0.6)
     options = ClockChangeOptions()
     assert clear.is_clear(options.sigmas, options)
     for change in (
@@ -109,8 +110,23 @@ def test_both_sides_must_tell_it():
         clear._replace(sigmas=1.0),
         clear._replace(left=0.8),
         clear._replace(gain=0.95),
+        clear._replace(disagreement=0.05),
     ):
         assert not change.is_clear(options.sigmas, options)
+
+
+def test_a_turn_at_a_steady_rate_fits_at_other_times_too():
+    log = drive()
+    at = log.times - log.times[0]
+    middles = 0.25 * at[-1], 0.75 * at[-1]
+    headings = sum(0.3 * np.clip(at - middle + 6.0, 0.0, 12.0) for middle in middles)
+    steady = replace(log, odometry=np.stack([0.0 * at, 0.0 * at, headings], axis=1), odometry_path=None)
+    begins = np.concatenate([np.arange(-2.0, 2.0, 0.4) + middle for middle in middles])
+    noise = 0.002 * np.random.default_rng(1).standard_normal(len(begins))
+    turns = Turns(begins + log.times[0], begins + log.times[0] + 0.4, 0.3 * 0.4 + noise)
+    change = clock_change(steady, turns, ClockChangeOptions(), 6)
+    assert change is not None
+    assert change.disagreement < 0.05
 
 
 def test_poses_are_left_out_where_it_is_unsure_which_clock_they_have():
