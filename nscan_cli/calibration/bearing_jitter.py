@@ -28,7 +28,7 @@ def checked_bearings(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog
     by_file = wrap(log.angle_min - usual)
     if float(np.median(np.abs(np.diff(by_file)))) < jitter.min_jitter:
         return log, []
-    found = measure_steps(log, telling_steps(log, options.steps), options.steps)
+    found = measure_steps(log, telling_steps(log, options.steps), options.steps, turns_alone=True)
     odometry = found.odometry(log.odometry)
     known = are_known(odometry)
     if np.count_nonzero(known) < options.min_steps:

@@ -219,7 +219,7 @@ def _of_clocks(
     if not signs:
         return []
     rows = telling_steps(log, options.steps, options.more_steps)
-    steps = measure_steps(log, rows, options.steps, known=known)
+    steps = measure_steps(log, rows, options.steps, known=known, turns_alone=True)
     offsets = [(sign, clock_offset(log, steps, options.clock, sign)) for sign in signs]
     told = [
         (found.disagreement, sign, found)

@@ -52,7 +52,7 @@ def _growing(
     steps, (first, last) = None, telling_steps(log, options.steps, count)
     for part in range(parts):
         some = slice(part, None, parts)
-        more = measure_steps(log, (first[some], last[some]), options.steps, known=known)
+        more = measure_steps(log, (first[some], last[some]), options.steps, known=known, turns_alone=True)
         steps = more if steps is None else steps.with_others(more)
         yield StepEvidence(log, odometry, steps, options)
 

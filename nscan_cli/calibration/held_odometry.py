@@ -14,8 +14,8 @@ import numpy as np
 from nscan_cli.calibration.driving_direction import driving_direction
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import HeldOdometryOptions
-from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names
 from nscan_cli.logs.robot_parts import evenly
@@ -144,7 +144,7 @@ def _scans_turn(
     if len(turns) < options.min_measured:
         return False
     chosen = turns[evenly(len(turns), options.more_steps)]
-    measured = measure_steps(log, (begins[chosen], ends[chosen]), steps).laser[:, 2]
+    measured = measure_steps(log, (begins[chosen], ends[chosen]), steps, turns_alone=True).laser[:, 2]
     return bool(np.count_nonzero(np.abs(measured) >= options.min_turn) >= options.min_measured)
 
 

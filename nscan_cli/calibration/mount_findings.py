@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.calibration.findings import AGREES, Finding, PlaceOfChange
-from nscan_cli.calibration.mount_fit import MountFit
+from nscan_cli.calibration.mount_fit import MountFit, is_nearer
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.step_evidence import is_nearer, is_wrong_scale
+from nscan_cli.calibration.step_evidence import is_wrong_scale
 from nscan_cli.calibration.view_change import DirectionChange
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robust_fit import RobustFit, median, robust_fit
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, inverse, wrap
 
 
 @dataclass(frozen=True)
@@ -118,3 +119,37 @@ def _covariance(fit: RobustFit, size: float) -> Array:
         return np.full((4, 4), np.inf)
     covariance: Array = jacobian @ fit.covariance @ jacobian.T
     return covariance
+
+
+def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:
+    """Whether a fit is nearer to one mounting (3,) than to another, by so many standard deviations.
+
+    Their places alone are compared.
+    """
+    apart = float(np.hypot(*(one - other)[:2]))
+    if apart == 0.0:
+        return False
+    away, from_other = (float(np.hypot(*(fit.mount - mount)[:2])) for mount in (one, other))
+    # From the line half-way between both.
+    return from_other**2 - away**2 > 2.0 * apart * sigmas * float(fit.sigmas[1:3].max())
+
+
+def is_nearer_in_direction(fit: MountFit, one: Array, other: Array, options: FileCheckOptions) -> bool:
+    """Whether the direction of a laser is clearly that of one mounting (3,), and not that of another."""
+    off, from_other = (abs(float(wrap(fit.mount[2] - mount[2]))) for mount in (one, other))
+    bound = max(options.min_mount_turn, options.mount_sigmas * float(fit.sigmas[3]))
+    return off <= bound < from_other - bound
+
+
+def is_inverse(fit: MountFit, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether a fit is clearly that of the robot as the laser sees it, in place of the mounting (3,)."""
+    other = inverse(mount)
+    off = np.abs(fit.mount - other)
+    off[2] = abs(float(wrap(off[2])))
+    bounds = [options.min_mount_move, options.min_mount_move, options.min_mount_turn]
+    # Of a laser that looks ahead, or back, only the sign of its place would differ.
+    return (
+        bool((off <= np.maximum(bounds, options.mount_sigmas * fit.sigmas[1:])).all())
+        and is_nearer(fit, other, mount, options.mount_sigmas)
+        and is_nearer_in_direction(fit, other, mount, options)
+    )

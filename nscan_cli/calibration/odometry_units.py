@@ -7,7 +7,7 @@ import numpy as np
 from nscan_cli.calibration.changed_odometry import with_scaled_steps
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import OdometryUnitOptions
-from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.calibration.step_sampling import possible_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names

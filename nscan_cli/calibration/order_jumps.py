@@ -57,7 +57,7 @@ def _turn_votes(log: LaserLog, is_other: Mask, options: FileCheckOptions) -> int
     if the others are; 0 without odometry."""
     if log.odometry is None:
         return 0
-    found = measure_steps(log, telling_steps(log, options.steps), options.steps)
+    found = measure_steps(log, telling_steps(log, options.steps), options.steps, turns_alone=True)
     laser, odometry = found.laser[:, 2], found.odometry(log.odometry)[:, 2]
     told = (np.abs(laser) >= options.view.min_turn) & (is_other[found.first] == is_other[found.last])
     agree = np.sign(laser * np.nan_to_num(odometry)) * np.where(is_other[found.first], -1.0, 1.0)

@@ -36,7 +36,7 @@ def checked_headings(
         return log, []
     # With y the wrong way odometry contradicts itself, too, but turns as the scans do.
     rows = telling_steps(log, options.steps, options.more_steps)
-    steps = measure_steps(log, rows, options.steps, known=known)
+    steps = measure_steps(log, rows, options.steps, known=known, turns_alone=True)
     seen, told = steps.laser[:, 2], steps.odometry(log.odometry)[:, 2]
     turning = np.isfinite(told) & (np.abs(seen) >= options.steps.min_motion)
     opposite = seen[turning] * told[turning] < 0.0

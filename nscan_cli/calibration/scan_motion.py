@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.calibration.sweep_options import ScanTurnOptions, SweepCheckOptions, SweepTimeOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog

@@ -15,7 +15,7 @@ from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
 from nscan_cli.logs.expected_sizes import ranges_over_odometry
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import MIRRORED, Array, Mask, are_known, inverse, relative, transform, wrap
+from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, transform, wrap
 
 
 class StepEvidence:
@@ -30,10 +30,13 @@ class StepEvidence:
         self.steps, self.options, self.poses = steps, options, odometry
         known = are_known(by_odometry)
         self.both, self.odometry = steps.of(known), by_odometry[known]
-        self.laser = self.both.laser
+        self._tells_place = self.both.tell_places(options.steps)
+        # What is not told has no length.
+        self.laser = np.where(self._tells_place[:, None], self.both.laser, self.both.laser * (0.0, 0.0, 1.0))
         least = options.steps.min_motion
         self._is_turning = np.abs(self.laser[:, 2]) >= least
-        self._is_moving, driven = _moves(self.laser, least), _moves(self.odometry, options.min_driven)
+        self._is_moving = _moves(self.laser, least) & self._tells_place
+        driven = self._is_driven()
         if 2 * int((driven & ~self._is_moving).sum()) > int(driven.sum()):
             # In ranges that are much too short all motion is small, and in proportion.
             arm = options.steps.metres_per_radian
@@ -60,7 +63,7 @@ class StepEvidence:
     def unchanged(self) -> tuple[int, int]:
         """The number of steps without motion by scans, and of all, among those that are clearly some by
         odometry."""
-        driven = _moves(self.odometry, self.options.min_driven)
+        driven = self._is_driven()
         return int((driven & ~self._is_moving).sum()), int(driven.sum())
 
     @property
@@ -171,6 +174,10 @@ class StepEvidence:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
         return self._fit(self.laser, self.both.odometry(self.poses * signs))
 
+    def _is_driven(self) -> Mask:
+        """(n,) which steps that tell places go clearly by odometry."""
+        return _moves(self.odometry, self.options.min_driven) & self._tells_place
+
     def _fit(self, laser: Array, odometry: Array, is_in_middle: bool = False) -> MountFit | None:
         moving, arm = self._is_moving, self.options.steps.metres_per_radian
         return fit_mount(laser[moving], odometry[moving], arm, is_in_middle=is_in_middle)
@@ -262,37 +269,3 @@ def turns_agree(turns: TurnFit, options: FileCheckOptions) -> bool:
 def are_of_one_size(turns: TurnFit, options: FileCheckOptions) -> bool:
     """Whether turns by odometry and by scans are of the same size in the mean; they may be opposite."""
     return abs(abs(turns.ratio) - 1.0) <= options.max_turn_error
-
-
-def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:
-    """Whether a fit is nearer to one mounting (3,) than to another, by so many standard deviations.
-
-    Their places alone are compared.
-    """
-    apart = float(np.hypot(*(one - other)[:2]))
-    if apart == 0.0:
-        return False
-    away, from_other = (float(np.hypot(*(fit.mount - mount)[:2])) for mount in (one, other))
-    # From the line half-way between both.
-    return from_other**2 - away**2 > 2.0 * apart * sigmas * float(fit.sigmas[1:3].max())
-
-
-def is_nearer_in_direction(fit: MountFit, one: Array, other: Array, options: FileCheckOptions) -> bool:
-    """Whether the direction of a laser is clearly that of one mounting (3,), and not that of another."""
-    off, from_other = (abs(float(wrap(fit.mount[2] - mount[2]))) for mount in (one, other))
-    bound = max(options.min_mount_turn, options.mount_sigmas * float(fit.sigmas[3]))
-    return off <= bound < from_other - bound
-
-
-def is_inverse(fit: MountFit, mount: Array, options: FileCheckOptions) -> bool:
-    """Whether a fit is clearly that of the robot as the laser sees it, in place of the mounting (3,)."""
-    other = inverse(mount)
-    off = np.abs(fit.mount - other)
-    off[2] = abs(float(wrap(off[2])))
-    bounds = [options.min_mount_move, options.min_mount_move, options.min_mount_turn]
-    # Of a laser that looks ahead, or back, only the sign of its place would differ.
-    return (
-        bool((off <= np.maximum(bounds, options.mount_sigmas * fit.sigmas[1:])).all())
-        and is_nearer(fit, other, mount, options.mount_sigmas)
-        and is_nearer_in_direction(fit, other, mount, options)
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.steady_way import differ_from_last
 from nscan_cli.poses import Indices, relative

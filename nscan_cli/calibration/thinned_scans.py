@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 

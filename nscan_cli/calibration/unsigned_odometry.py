@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.calibration.changed_odometry import with_scaled_steps
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import UnsignedOdometryOptions
-from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs, stretch_names

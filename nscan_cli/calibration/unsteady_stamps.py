@@ -33,7 +33,7 @@ def unsteady_delay(
     if found is None or found.left <= most:
         return None
     first, last = telling_steps(log, options.steps, options.more_steps)
-    steps = measure_steps(log, (first, last), options.steps, known=known)
+    steps = measure_steps(log, (first, last), options.steps, known=known, turns_alone=True)
     found = _best(log, steps, options)
     if found is None or found.left <= most or len(steps) < options.unsteady.min_measured_share * len(first):
         return None

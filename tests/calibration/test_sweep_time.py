@@ -7,8 +7,8 @@ import functools
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.sweep_time import SweepTime, sweep_time
 from nscan_cli.logs.laser_log import LaserLog

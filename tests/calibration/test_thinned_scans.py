@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from tests.slam.mapped_logs import office_log
 

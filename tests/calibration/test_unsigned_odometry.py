@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 
 from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.calibration.odometry_options import UnsignedOdometryOptions
-from nscan_cli.calibration.options import FileCheckOptions, StepOptions
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.step_options import StepOptions
 from nscan_cli.calibration.unsigned_odometry import checked_signs, reversed_stretches
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
