@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from nscan_cli.graph.model import Graph
+from nscan_cli.slam.backend.contradicting_loops import mend_contradicting_loops
 from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visits
 from nscan_cli.slam.backend.final_deskewing import deskew_by_final_path
 from nscan_cli.slam.backend.finish import finish_graph
@@ -55,6 +56,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     reject_contradicting_loops(state)
     deskew_by_final_path(state)
     refine(state)
+    mend_contradicting_loops(state)
     mend_contradicting_visits(state)
     believe_odometry_over_breaks(state)
     return finish_graph(state)

@@ -199,7 +199,7 @@ def _contradictions(state: SlamState) -> list[str]:
     chi2 = chi2_by_three(state.energies.of(state.route, relations), state.poses)
     loops = chi2[[relation.origin == "loop" for relation in relations]]
     mean, of_loops = float(chi2.mean()), float(loops.mean()) if len(loops) else 0.0
-    if mean <= options.max_mean_chi2 and of_loops <= options.max_mean_loop_chi2:
+    if mean <= state.options.loop_closure.max_mean_chi2 and of_loops <= options.max_mean_loop_chi2:
         return []
     nodes = relations[int(np.argmax(chi2))].nodes
     return [

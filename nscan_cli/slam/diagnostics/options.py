@@ -49,8 +49,5 @@ class DiagnosticsOptions:
     gap_periods: float = 3.0
     """Scans are missing if the next one comes later than this multiple of the median period. A larger value
     warns less."""
-    max_mean_chi2: float = 3.0
-    """Largest mean χ² of all relations, with three degrees of freedom. It is below 1 on sound logs. A larger
-    value warns less."""
     max_mean_loop_chi2: float = 6.0
     """Largest mean χ² of loops, which join what has drifted. A larger value warns less."""

@@ -130,6 +130,9 @@ class LoopClosureOptions:
     """Largest distance by which tracking slips, m. A larger one accepts more."""
     free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
     """When visits of the finished map contradict each other."""
+    max_mean_chi2: float = 3.0
+    """Loops contradict the rest of the graph if the mean χ² of all relations, with three degrees of freedom,
+    is larger. It is below 1 on sound logs. A larger value maps less often without them, and warns less."""
     contradicted_distance: float = 20.0
     """Where visits of a place contradict each other in the finished map, the search covers at least this
     distance, m. A larger one mends larger errors and is slower."""
