@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, are_known
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.point_spacing import spaced_points
@@ -97,7 +97,7 @@ def scan_batches(
 ) -> Iterator[ScanBatch]:
     """The scans of a log, batch by batch: the points that are matched, and the odometry (S, 3), if any.
 
-    Scans in the `frozen` rows (H,) have no points.
+    Scans in the `frozen` rows (H,) have no points, and none that have few and odometry.
     """
     # Along a path they are corrected already.
     is_swept = log.beam_times is not None and log.path is None and len(log) > 1
@@ -110,7 +110,10 @@ def scan_batches(
         else:
             points, ends = log.batch_points(rows, options.max_range)
         kept = spaced_points(points, ends, options.point_spacing, options.spacing_neighbours)
-        kept &= np.repeat(~np.isin(np.arange(first, rows.stop), frozen), np.diff(ends))
+        is_left_out = np.isin(np.arange(first, rows.stop), frozen)
+        if odometry is not None:
+            is_left_out |= (np.diff(ends) < options.min_points) & are_known(odometry[rows])
+        kept &= np.repeat(~is_left_out, np.diff(ends))
         if not kept.all():
             points, shares = points[kept], shares[kept] if is_swept else NONE
             ends = np.concatenate([[0], np.cumsum(kept)])[ends]
