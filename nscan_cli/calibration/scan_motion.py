@@ -78,14 +78,14 @@ class ScanMotion:
         before, after = self.twist(one), self.twist(other)
         return 0.0 if before is None or after is None else abs(float(after[2] - before[2]))
 
-    def is_steady(self, row: int, options: SweepTimeOptions) -> bool:
-        """Whether the laser turns before and after a row at nearly the same rate."""
+    def unsteadiness(self, row: int, options: SweepTimeOptions) -> float:
+        """The share by which the rate of the laser's turn changes from before a row to after it; inf in
+        doubt."""
         both = self._on_both_sides(row)
         if both is None:
-            return False
-        before, after = both[0][2], both[1][2]
-        most = max(abs(before), abs(after), options.slow)
-        return bool(abs(after - before) <= options.max_change * most)
+            return float(np.inf)
+        before, after = float(both[0][2]), float(both[1][2])
+        return abs(after - before) / max(abs(before), abs(after), options.slow)
 
     def _on_both_sides(self, row: int) -> tuple[Array, Array] | None:
         """The velocities (3,) from the scan before, and to the next one; None in doubt."""
@@ -122,8 +122,10 @@ class ScanMotion:
         scan, twist = self._scan(row), self.twist(row) if 0 < row < len(self.log) - 1 else None
         if scan is None or twist is None:
             return None
+        # The velocities are those of steps, which an arc turns by half of their own turn.
+        seconds = 0.5 * float(self.log.times[row + 1] - self.log.times[row - 1])
         points = scan[0].copy()
-        move_along_arc(points, scan[1] * sweep, twist, False)
+        move_along_arc(points, scan[1] * (sweep / seconds), twist * seconds, False)
         return points
 
     def turned(self, row: int, sweep: float) -> float | None:
@@ -149,13 +151,16 @@ class ScanMotion:
         if before is None or after is None:
             return None
         way = 0.5 * (before + after) * float(self.log.times[other] - self.log.times[one])
-        found = np.empty(len(sweeps))
-        for k, sweep in enumerate(sweeps):
+        found, ends = np.empty(len(sweeps)), dict[float, Array]()
+        # A match with a far too long time may slip, and the next ones that begin where it ended, too.
+        for k in np.argsort(np.abs(sweeps), kind="stable").tolist():
+            sweep = sweeps[k]
             first, second = self.corrected(one, sweep), self.corrected(other, sweep)
             if first is None or second is None:
                 return None
-            end = match_scans(first, second, way, self.steps.pair, is_near=k > 0)
-            found[k], way = end.energy / len(second), end.pose
+            start = ends[min(ends, key=lambda done: abs(done - sweep))] if ends else way
+            end = match_scans(first, second, start, self.steps.pair, is_near=bool(ends))
+            found[k], ends[sweep] = end.energy / len(second), end.pose
         return found
 
     def _scan(self, row: int) -> tuple[Array, Array] | None:

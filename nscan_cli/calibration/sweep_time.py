@@ -53,9 +53,9 @@ def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -
     count = round(time.reach / time.step)
     sweeps = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
     # Pairs of scans that are spread over the log tell more than as many of the same turns.
-    energies = _energies(motion, longest, sweeps, replace(options, scans_beside=0))
+    energies, uneven = _energies(motion, longest, sweeps, replace(options, scans_beside=0))
     if len(energies) < time.min_steady:
-        energies = _energies(motion, longest, sweeps, options)
+        energies, uneven = _energies(motion, longest, sweeps, options)
     pairs = len(energies)
     if pairs < options.min_pairs:
         return SweepTime(0.0, np.inf, pairs)
@@ -67,25 +67,35 @@ def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -
         _sharpest(sweeps, np.delete(energies, pair, axis=0), time) for pair in range(pairs)
     ])  # fmt: skip
     sigma = np.sqrt((pairs - 1) * without_one.var())
-    return SweepTime(sweep, float(np.hypot(sigma, time.unsteadiness * sweep)), pairs)
+    share = time.unsteadiness * max(uneven / time.max_change, 1.0)
+    return SweepTime(sweep, float(np.hypot(sigma, share * sweep)), pairs)
 
 
-def _energies(motion: ScanMotion, longest: float, sweeps: Array, options: SweepCheckOptions) -> Array:
-    """(P, T) energies of P pairs for times of a sweep (T,), of scans in steady turns if there are enough."""
+def _energies(
+    motion: ScanMotion, longest: float, sweeps: Array, options: SweepCheckOptions
+) -> tuple[Array, float]:
+    """(P, T) energies of P pairs for times of a sweep (T,), of scans in steady turns if there are enough.
+
+    Also returns the mean share by which turns change within a pair.
+    """
     time = options.time
     steady, uneven = list[Array](), list[Array]()
+    changes: tuple[list[float], list[float]] = [], []
     for one, other in turning_pairs(motion, longest, options, time.scans, time.most_rows):
-        is_steady = motion.is_steady(one, time) and motion.is_steady(other, time)
+        change = max(motion.unsteadiness(one, time), motion.unsteadiness(other, time))
+        is_steady = change <= time.max_change
         if not is_steady and len(uneven) == time.pairs:
             continue
         energies = motion.energies(one, other, sweeps.tolist())
         if energies is not None:
             (steady if is_steady else uneven).append(energies)
+            changes[not is_steady].append(change)
         if len(steady) == time.pairs:
             break
     if len(steady) < time.min_steady:
+        changes[0].extend(changes[1][: time.pairs - len(steady)])
         steady += uneven[: time.pairs - len(steady)]
-    return np.array(steady).reshape(-1, len(sweeps))
+    return np.array(steady).reshape(-1, len(sweeps)), float(np.mean(changes[0])) if steady else 0.0
 
 
 def _sharpest(sweeps: Array, energies: Array, options: SweepTimeOptions) -> float:
