@@ -73,12 +73,14 @@ def _best_delay(
 
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
-    """Rows of scans in turns, evenly among them."""
+    """Rows of scans in and beside turns, first those where their rate changes most: while the robot turns
+    steadily, it turns as far at another time as well."""
     rows = _in_turns(motion.spread_rows(options, options.scans), motion, options)
-    if len(rows) < options.min_delay_turns:
-        beside = motion.rows_beside(rows, options.scans_beside)
-        rows = np.union1d(rows, _in_turns(beside, motion, options))
-    used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
+    rows = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)]
+    rows = np.union1d(rows, motion.rows_beside(rows, options.scans_beside))
+    rows = rows[(rows >= 2) & (rows <= len(motion.log) - 3)]
+    changes = np.abs(motion.rates(rows + 1) - motion.rates(rows - 1))
+    used: list[int] = rows[np.argsort(-changes, kind="stable")[: options.max_delay_turns]].tolist()
     return used
 
 
