@@ -16,7 +16,6 @@ from nscan_cli.calibration.sweep_delay import sweep_delay
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
 from nscan_cli.calibration.sweep_time import sweep_time
 from nscan_cli.files.text import counted
-from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -33,7 +32,7 @@ def checked_sweep(
     if reading.as_recorded or reading.sweep is not None or len(log) < options.sweep.min_scans:
         return log, reading, []
     told = usual_sweep_time(log)
-    longest = abs(told) or _longest_sweep(log, options)
+    longest = abs(told) or _time_between_scans(log, options)
     if longest == 0.0:
         return log, reading, []
     motion, said = ScanMotion.of_log(log, options.steps, options.sweep), list[str]()
@@ -45,6 +44,10 @@ def checked_sweep(
         # If the time is short, the robot turns little in it, and the scans still tell.
         finer = replace(options.sweep, min_winding=options.sweep.least_winding)
         evidence = sweep_evidence(motion, tried, told, finer)
+    elif not told and _is_in_doubt(evidence, options):
+        steps = replace(options.steps, max_beams=options.sweep.time.max_beams)
+        closer = replace(options.sweep, pairs=options.sweep.time.pairs)
+        evidence = sweep_evidence(ScanMotion.of_log(log, steps, closer), tried, told, closer)
     sweep, how = _sweep_by_scans(log, evidence, told, options)
     if sweep != told:
         reading = replace(reading, sweep=round(sweep, DECIMALS) + 0.0)
@@ -68,6 +71,12 @@ def _times_beside(log: LaserLog, told: float, options: FileCheckOptions) -> tupl
     longer = (2.0 * abs(told), between) if between >= 2.0 * least * abs(told) else (between,)
     others = [float(np.copysign(each, told)) for each in (0.5 * told, *longer) if each]
     return 0.0, told, -told, *(each for each in others if max(each / told, told / each) >= least)
+
+
+def _is_in_doubt(evidence: SweepEvidence, options: FileCheckOptions) -> bool:
+    """Whether more beams and more pairs of scans may show a sweep that the file does not tell."""
+    certainty = evidence.sigmas(evidence.sharpest, 0.0)
+    return evidence.is_little or options.sweep.likelier_sigmas <= certainty < options.sweep.sigmas
 
 
 def _sweep_by_scans(
@@ -121,12 +130,6 @@ def _without_delay(
         f"as with --stamp {place}; --as-recorded believes the file"
     )
     return with_sweep_times(log, file_sweep_times(log), place), replace(reading, stamp=place), said
-
-
-def _longest_sweep(log: LaserLog, options: FileCheckOptions) -> float:
-    """The time from scan to scan, s, if the laser looks around as those do that sweep; else 0."""
-    first, last, _ = field_of_view(log)
-    return _time_between_scans(log, options) if abs(last - first) >= options.sweep.min_view else 0.0
 
 
 def _time_between_scans(log: LaserLog, options: FileCheckOptions) -> float:

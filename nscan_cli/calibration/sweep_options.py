@@ -122,9 +122,6 @@ class SweepCheckOptions:
     likelier_sigmas: float = 2.0
     """The time of a sweep is measured if another length than the file's makes scans sharper by this number of
     standard deviations. A larger value takes less time, and believes the file more often."""
-    min_view: float = math.radians(190.0)
-    """Least field of view of a laser that is checked though its file has no times of beams, rad. A smaller
-    value also checks lasers that look ahead, which takes time."""
     shortest: float = 0.012
     """Shortest scan period of such a laser, s. A smaller value checks more lasers."""
     longest: float = 0.5
