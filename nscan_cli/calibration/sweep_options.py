@@ -55,8 +55,8 @@ class SweepTimeOptions:
     """Matches slip, so the energy of a pair counts up to this share of the median depth of all pairs above
     its minimum. With a smaller share fewer times beside the best one count."""
     unsteadiness: float = 0.03
-    """Standard deviation that uneven turns add to the time, as a share of it. A larger value believes the
-    file more often."""
+    """Standard deviation that turns add to the time, as a share of it, where their rates change by up to
+    `max_change` on average; more in proportion where by more. A larger value believes the file more often."""
     sigmas: float = 3.0
     """The measured time differs from another one if it is off by at least this number of standard deviations.
     A larger value believes the file more often."""
