@@ -42,6 +42,8 @@ class ScanMotion:
         new = np.array([row for row in np.unique(rows).tolist() if row not in self._rates], dtype=np.int64)
         seconds = self.log.times[new + 1] - self.log.times[new - 1]
         is_measured = (seconds > 0.0) & (seconds <= 2 * self.longest_step)
+        # Nothing turns between like scans, as in a file that repeats one.
+        is_measured &= (self.log.ranges[new - 1] != self.log.ranges[new + 1]).any(axis=1)
         rates, those = np.zeros(len(new)), new[is_measured]
         if len(those):
             rates[is_measured] = scan_turns(self.log, those - 1, those + 1, self.turns) / seconds[is_measured]
