@@ -7,6 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration import clock_findings, findings, mount_findings
+from nscan_cli.calibration.changed_odometry import (
+    with_mirrored_odometry,
+    with_scaled_odometry,
+    with_seen_mount,
+)
 from nscan_cli.calibration.clock_offset import ClockOffset, clock_offset
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
@@ -23,6 +28,7 @@ from nscan_cli.calibration.step_evidence import (
     explains_positions,
     is_change,
     is_excluded,
+    is_wrong_scale,
     never_changes,
     turns_agree,
 )
@@ -30,6 +36,7 @@ from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.unsteady_stamps import unsteady_delay
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import wrap
 
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
 """Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
@@ -103,6 +110,32 @@ def changed_view(
     if evidence is None or evidence.moving < options.min_steps:
         return None
     return _of_view(log, evidence, reading, options)
+
+
+def by_most_steps(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> LaserLog | None:
+    """The log with its odometry as most steps have it, though they may not explain the others; None if that
+    is as the file has it, or they tell too little. `known` is that of `find_contradictions`."""
+    evidence = _evidence(log, options, known)
+    if evidence is None or evidence.moving < options.min_steps:
+        return None
+    is_image = evidence.turns is not None and evidence.turns.ratio < 0.0
+    fit = evidence.mirrored_fit if is_image else evidence.fit
+    if fit is None:
+        return None
+    is_turned = abs(float(wrap(fit.mount[2] - log.mount[2]))) > options.min_mount_turn
+    if not (is_image or is_turned or is_wrong_scale(fit, options)):
+        return None
+    # Few steps tell where the laser is.
+    mount, log = np.append(log.mount[:2], fit.mount[2]), with_scaled_odometry(log, fit.scale)
+    return with_mirrored_odometry(log, mount) if is_image else with_seen_mount(log, mount)
+
+
+def is_explained(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> bool:
+    """Whether a mounting and a scale explain the steps, of scans as they are or mirrored. `known` is that of
+    `find_contradictions`."""
+    evidence = _evidence(log, options, known)
+    fits = [] if evidence is None else [evidence.fit, evidence.mirrored_fit]
+    return evidence is None or any(explains_positions(fit, options) for fit in fits)
 
 
 def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> StepEvidence | None:

@@ -14,7 +14,12 @@ from nscan_cli.calibration.changed_odometry import (
 from nscan_cli.calibration.clock_changes import checked_clock_change
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
-from nscan_cli.calibration.contradictions import changed_view, find_contradictions
+from nscan_cli.calibration.contradictions import (
+    by_most_steps,
+    changed_view,
+    find_contradictions,
+    is_explained,
+)
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.heading_jumps import checked_heading_jumps
 from nscan_cli.calibration.held_odometry import checked_held
@@ -64,12 +69,21 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, headings = checked_headings(log, reading, options, known)
     log, turned_back = checked_heading_jumps(log, options, known)
     recorded, is_given = log, bool(reading.clock_offset)
-    units, held, motion, along = _compared_file(recorded, reading, options, known)
-    offset = 0.0 if is_given else round(sum(finding.clock_offset for finding in motion.findings), 2)
-    if offset:
-        # Whatever else is wrong shows once both are compared at the same times.
-        recorded = with_delay(recorded, offset)
+    offset, in_metres = 0.0, list[str]()
+    while True:
         units, held, motion, along = _compared_file(recorded, reading, options, known)
+        found, is_last = motion.findings, is_given or bool(offset)
+        later = 0.0 if is_last else round(sum(finding.clock_offset for finding in found), 2)
+        scales = [finding for finding in found if "odometry_scale" in finding.corrected and not in_metres]
+        # Whatever else is wrong shows once both are compared at the same times, and in one unit.
+        if later:
+            offset, recorded = later, with_delay(recorded, later)
+        elif scales:
+            corrected = replace(reading, **scales[0].corrected)
+            recorded, reading = _as_read(recorded, reading, corrected), corrected
+            in_metres = [scales[0].message]
+        else:
+            break
     log, reading, signed, known = motion.log, motion.reading, motion.signed, motion.known
     findings, stretched = motion.findings, motion.stretched
     reversing, late = motion.reversing, motion.set_anew
@@ -92,14 +106,11 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
             log, reading = _as_read(log, reading, corrected), corrected
-            if not reversing and "odometry_scale" in finding.corrected:
-                # In another unit the ranges did not change as odometry says.
-                log, reversing = checked_signs(log, options.unsigned, options.steps)
     if not is_mirror_image:
         # In the unit of the mounting.
         log = agreeing(log, findings)
     said += jitter + order + jumps + headings + turned_back + units + held + stretched + reversing + late
-    said += [finding.message for finding in findings] + along
+    said += in_metres + [finding.message for finding in findings] + along
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)
@@ -135,6 +146,10 @@ class _Compared:
         """The number of steps that the scans have measured."""
         return sum(step is not None for step in self.known.values())
 
+    def is_explained(self, options: FileCheckOptions) -> bool:
+        """Whether a mounting and a scale explain the steps."""
+        return is_explained(self.signed, options, self.known)
+
     @property
     def is_changed(self) -> bool:
         """Whether something was put right, or is to be said."""
@@ -149,12 +164,17 @@ def _compared_file(
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
     motion = _compared(log, reading, options, known)
-    if motion.is_changed:
-        # What the scans show may be someone who goes along, and odometry is right without his readings.
-        alone, masked, seen = checked_companion(log, reading, options.companion)
-        without_him = _compared(alone, masked, options, {}) if seen else motion
-        if seen and not without_him.findings and without_him.measured >= options.min_steps:
-            return units, held, without_him, seen
+    # What the scans show may be someone who goes along. Without his readings odometry is right, or what is
+    # wrong with it explains the others: most steps tell it already, and so where the robot goes.
+    ways = [log] if motion.is_changed else []
+    likely = by_most_steps(log, options, known)
+    for way in [*ways, *([] if likely is None else [likely])]:
+        alone, masked, seen = checked_companion(way, reading, options.companion)
+        if seen:
+            without_him = _compared(replace(log, ranges=alone.ranges), masked, options, {})
+            is_right = not without_him.findings if way is log else without_him.is_explained(options)
+            if is_right and without_him.measured >= options.min_steps:
+                return units, held, without_him, seen
     return units, held, motion, []
 
 

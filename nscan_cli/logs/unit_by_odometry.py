@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.files.text import counted
 from nscan_cli.logs.expected_sizes import ExpectedSizes, ranges_over_odometry
 from nscan_cli.logs.predicted_ranges import beams_along, predicted_ranges
-from nscan_cli.logs.range_unit import end_of_distances
+from nscan_cli.logs.range_unit import RangeUnitOptions, end_of_distances
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.robot_parts import evenly
 from nscan_cli.logs.scan_order import ScanOrder
@@ -160,8 +160,11 @@ def unit_by_odometry(
     scans = _Readings(raw, order, end, codes, beams)
     if _explained(scans, steps, median, options) is not None:
         return None
-    told = []
+    told, sizes = [], RangeUnitOptions()
     for name, scale in units:
+        if not sizes.min_median <= median * scale <= sizes.max_median:
+            # Of ranges in such a unit, odometry is in another one as well.
+            continue
         # Or odometry is in another unit, and the ranges are in metres.
         if ranges_over_odometry(median, speed, scale, options.expected) > options.min_factor:
             found = _explained(scans, steps.scaled(1.0 / scale), median, options)
