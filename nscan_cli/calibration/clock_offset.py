@@ -13,7 +13,7 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.odometry_options import ClockOptions
 from nscan_cli.calibration.parabola import parabola_minimum
-from nscan_cli.calibration.turn_differences import turn_differences
+from nscan_cli.calibration.turn_differences import are_told, turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import are_known
 
@@ -53,7 +53,13 @@ def clock_offset(
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
     differences = turn_differences((at, headings), (begins, ends), turns, offsets)
-    off = np.minimum(differences, options.max_difference).sum(axis=1) / whole
+    # A turn that odometry does not tell, for it is missing there or ends early, says nothing of an offset.
+    stamps = np.union1d(at, log.times[[0, -1]])
+    told = are_told(stamps, (begins, ends), offsets, options.longest_gap)
+    sizes = (told * np.minimum(np.abs(turns), options.max_difference)).sum(axis=1)
+    off = np.ones(len(offsets))
+    off_told = (told * np.minimum(differences, options.max_difference)).sum(axis=1)
+    np.divide(off_told, sizes, out=off, where=sizes > options.min_told * whole)
     best = int(np.argmin(off))
     is_inside = 0 < best < len(off) - 1
     offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])

@@ -98,7 +98,9 @@ def find_contradictions(
         never_turns = bool(is_still[2]) and turns.steps >= options.min_turns_unmeasured
         if never_turns or _are_told(turns, options) or _is_of_other_size(turns, options):
             found.append(findings.wrong_turns(turns))
-    return found + of_positions(log.mount, fit, evidence, reading, options)
+    # Wrong turns would have the laser anywhere on the robot.
+    tell_place = turns is None or turns_agree(turns, options)
+    return found + of_positions(log.mount, fit, evidence, reading, options, tell_place)
 
 
 def changed_view(

@@ -15,6 +15,12 @@ class ClockOptions:
     """Largest clock offset that is tried, s. A larger value takes longer."""
     resolution: float = 0.1
     """Interval between the offsets that are tried, s. A smaller value takes longer."""
+    longest_gap: float = 2.0
+    """Over a longer gap odometry tells no turn, s: as long as the longest step that is measured. A larger
+    value takes turns over longer gaps for steady."""
+    min_told: float = 0.5
+    """Turns may agree at an offset if odometry tells this share of them there. A smaller value finds an
+    offset by fewer turns."""
     max_difference: float = 0.1
     """Turns of a step that differ by more count as different by this, rad: such steps are slips, or matches
     that failed. A larger value gives them more weight."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 
 
 class Turns(NamedTuple):
@@ -56,3 +56,14 @@ def turn_differences(
     told = np.interp(ends - offsets[:, None], at, headings)
     told -= np.interp(begins - offsets[:, None], at, headings)
     return np.abs(told - turned)
+
+
+def are_told(at: Array, steps: tuple[Array, Array], offsets: Array, longest: float) -> Mask:
+    """(O, n) whether odometry with stamps (P,), s, tells turns that begin and end at times (n,), at each of
+    the offsets (O,), s: there is no gap in it that is longer than so many seconds."""
+    gaps = np.append(0, np.cumsum(np.diff(at) > longest))
+    begins, ends = (times - offsets[:, None] for times in steps)
+    before = np.maximum(np.searchsorted(at, begins, "right") - 1, 0)
+    behind = np.minimum(np.searchsorted(at, ends), len(at) - 1)
+    told: Mask = gaps[before] == gaps[behind]
+    return told

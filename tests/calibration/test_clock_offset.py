@@ -17,6 +17,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import are_known
 from tests.data import data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation import faults, odometry_faults
 from tests.slam.keyframe_drives import round_scene
 
@@ -52,6 +53,19 @@ def test_an_offset_that_the_user_gave_is_left_and_a_better_one_named():
     assert "try --clock-offset -2.0" in said
     assert found.reading.clock_offset == 1.0
     assert found.log is log
+
+
+@pytest.mark.parametrize("rows", [slice(266, 533), slice(533, None)])
+def test_a_clock_is_told_by_the_turns_that_odometry_has(rows):
+    """In a third of the log it stands, or is missing."""
+    log = excerpt(read_log(str(data_file("mit-csail.log.gz"))), slice(900, 1700))
+    log = odometry_faults.late(replace(log, odometry_path=None), 2.0)
+    fault = (
+        odometry_faults.missing(log, rows) if rows.stop is None else odometry_faults.held(log, rows, False)
+    )
+    found = checked(fault)
+    assert found.reading.clock_offset == pytest.approx(-1.9, abs=0.15)
+    assert not [said for said in found.messages if "elsewhere" in said or "contradicts" in said]
 
 
 def test_a_late_clock_is_found_though_most_turns_agree():

@@ -22,7 +22,7 @@ from nscan_cli.logs.reading_options import ReadingOptions, sectors_from
 from nscan_cli.poses import wrap
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import OFFICE_LOG, data_file
-from tests.logs.excerpts import truth_of
+from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation import faults, odometry_faults, things_beside
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
@@ -104,6 +104,33 @@ def test_a_long_cart_that_swings_through_all_bearings_is_in_one_place():
     log = things_beside.cart(drive(), hitch=0.4, length=1.0)
     assert log.odometry is not None
     assert find_companion(log, log.odometry, CompanionOptions()) is not None
+
+
+ELSEWHERE: dict[str, tuple[Callable[[LaserLog], LaserLog], str]] = {
+    "in millimetres": (
+        lambda log: odometry_faults.scaled(log, 1000.0),
+        "as by --odometry-scale 0.001",
+    ),
+    "by a laser that looks aside": (
+        lambda log: faults.mounted_otherwise(log, np.pi / 2),
+        "try --mount -0.04,0,0",
+    ),
+    "by a laser that looks back": (lambda log: faults.mounted_otherwise(log, np.pi), "try --mount -0.04,0,0"),
+    "with readings in the wrong order": (faults.mirrored, "try --flip"),
+}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_it_is_found_though_odometry_as_recorded_leads_elsewhere(name):
+    make, words = ELSEWHERE[name]
+    log = read_log(str(data_file("fr079.log.gz")))
+    log = replace(things_beside.leader(excerpt(log, slice(2800, 4000)), 0.6), beam_times=None)
+    checked = checked_file(make(log), ReadingOptions(), FileCheckOptions())
+    finding, said = checked.messages[-2:]
+    assert words in finding
+    assert "something goes along with the robot" in said
+    (sector,) = checked.reading.mask or ()
+    assert -0.9 < sector[0] < -0.4 < 0.4 < sector[1] < 0.9
 
 
 def test_without_odometry_the_option_is_named():

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.odometry_options import ClockOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -107,6 +108,23 @@ def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
     is_changed = re.search("odometry is (mirrored as well|changed to agree)", checked.messages[0])
     assert (checked.log is log) == (is_changed is None)
     assert checked.reading == ReadingOptions()
+
+
+def test_turns_that_disagree_tell_no_place_of_the_laser():
+    """By a clock that was not found."""
+    late = odometry_faults.late(replace(excerpt(real_drive(), slice(900, 1700)), odometry_path=None), 2.0)
+    log = odometry_faults.held(late, slice(266, 533), False)
+    options = FileCheckOptions(clock=ClockOptions(gain=0.0))
+    said = checked_file(log, ReadingOptions(), options).messages
+    assert not [each for each in said if "elsewhere on the robot" in each]
+
+
+def test_what_is_put_right_is_compared_again():
+    """In another unit few steps of this log seem to show a laser that looks elsewhere."""
+    log = replace(read_log(str(data_file("field/urg-corridor-1.bag"))), beam_times=None, odometry_path=None)
+    as_recorded, said = found(log), found(odometry_faults.scaled(log, 100.0))
+    assert "--odometry-scale 0.01;" in said[-1]
+    assert said[:-1] == as_recorded
 
 
 SCALES = (1000.0, 10.0, 0.1, 300.0)

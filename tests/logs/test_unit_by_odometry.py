@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import SAMPLE_LOGS, data_file
+from tests.logs.excerpts import excerpt
 from tests.simulation.faults import ranges_scaled
 from tests.simulation.odometry_faults import scaled
 
@@ -64,6 +66,14 @@ def test_odometry_in_another_unit_changes_no_ranges(office: LaserLog, tmp_path: 
     """Rooms of the size of the readings are likelier than robots of such speeds."""
     path = in_file(scaled(office, factor), tmp_path, 1.0)
     assert contradictions(path) == []
+
+
+def test_odometry_in_another_unit_takes_no_room_for_a_hundred_metres_wide(tmp_path: Path):
+    """Readings in millimetres, and odometry in centimetres, agree as if the readings were in decimetres."""
+    log = excerpt(read_log(str(data_file("fr079.log.gz"))), slice(2800, 4000))
+    path = in_file(scaled(log, 100.0), tmp_path, 0.001)
+    with pytest.raises(InputDataError, match=r"give --range-scale 0\.001"):
+        read_log(str(path))
 
 
 def test_odometry_that_contradicts_all_units_tells_none(office: LaserLog, tmp_path: Path):
