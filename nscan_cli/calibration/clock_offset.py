@@ -53,9 +53,8 @@ def clock_offset(
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
     differences = turn_differences((at, headings), (begins, ends), turns, offsets)
-    # A turn that odometry does not tell, for it is missing there or ends early, says nothing of an offset.
-    stamps = np.union1d(at, log.times[[0, -1]])
-    told = are_told(stamps, (begins, ends), offsets, options.longest_gap)
+    # A turn that odometry does not tell, for it stands or is missing there, says nothing of an offset.
+    told = are_told(at, (begins, ends), offsets, options.longest_gap)
     sizes = (told * np.minimum(np.abs(turns), options.max_difference)).sum(axis=1)
     off = np.ones(len(offsets))
     off_told = (told * np.minimum(differences, options.max_difference)).sum(axis=1)

@@ -162,7 +162,13 @@ def _compared_file(
     """Compare a log as it was recorded: messages on units, on odometry that stands, and on someone who goes
     along, around what is compared then."""
     log, units = checked_units(recorded, options.units, options.steps)
+    as_recorded = log
     log, held = checked_held(log, options.held, options.steps)
+    if held:
+        # A clock that is behind makes odometry begin late, as if it stood.
+        motion = _compared(as_recorded, reading, options, known)
+        if any(finding.clock_offset for finding in motion.findings):
+            return units, [], motion, []
     motion = _compared(log, reading, options, known)
     # What the scans show may be someone who goes along. Without his readings odometry is right, or what is
     # wrong with it explains the others: most steps tell it already, and so where the robot goes.

@@ -55,17 +55,22 @@ def test_an_offset_that_the_user_gave_is_left_and_a_better_one_named():
     assert found.log is log
 
 
-@pytest.mark.parametrize("rows", [slice(266, 533), slice(533, None)])
-def test_a_clock_is_told_by_the_turns_that_odometry_has(rows):
-    """In a third of the log it stands, or is missing."""
+def test_a_clock_is_told_by_the_turns_that_odometry_has():
+    """In a third of the log it stands."""
     log = excerpt(read_log(str(data_file("mit-csail.log.gz"))), slice(900, 1700))
-    log = odometry_faults.late(replace(log, odometry_path=None), 2.0)
-    fault = (
-        odometry_faults.missing(log, rows) if rows.stop is None else odometry_faults.held(log, rows, False)
-    )
-    found = checked(fault)
+    late = odometry_faults.late(replace(log, odometry_path=None), 2.0)
+    found = checked(odometry_faults.held(late, slice(266, 533), False))
     assert found.reading.clock_offset == pytest.approx(-1.9, abs=0.15)
     assert not [said for said in found.messages if "elsewhere" in said or "contradicts" in said]
+
+
+def test_odometry_that_begins_late_by_its_clock_does_not_stand():
+    log = read_log(str(data_file("field/urg-corridor-1.bag")))
+    log = odometry_faults.late(replace(log, beam_times=None, odometry_path=None), 30.0)
+    found = checked(faults.mirrored(log))
+    assert found.reading.clock_offset == pytest.approx(-29.9, abs=0.1)
+    assert "try --flip" in found.messages[-1]
+    assert not [said for said in found.messages if "stands still" in said]
 
 
 def test_a_late_clock_is_found_though_most_turns_agree():
