@@ -21,9 +21,16 @@ def test_stretches_of_some_scans_are_named():
         assert said.startswith("the laser sees nothing from scan 120 to 139: odometry alone")
 
 
-def test_a_few_scans_and_a_reading_are_usual():
+def test_a_few_scans_and_a_quarter_of_the_beams_are_usual():
     numbers = np.arange(60)
     assert blind_scans(ranges(slice(20, 20 + LEAST.min_scans - 1)), numbers) == []
     seen = ranges(slice(20, 40))
-    seen[:, 7] = 3.0
+    seen[:, 7:12] = 3.0
     assert blind_scans(seen, numbers) == []
+
+
+def test_so_are_stretches_with_a_few_returns():
+    seen = ranges(slice(20, 40))
+    seen[:, 7:11] = 3.0
+    (said,) = blind_scans(seen, np.arange(60))
+    assert said.startswith("the laser has less than 5 returns from scan 20 to 39: odometry alone")

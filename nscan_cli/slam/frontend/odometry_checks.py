@@ -19,6 +19,8 @@ from nscan_cli.slam.frontend.view_similarity import view_similarity
 
 SHORTEST_PERIOD = 1e-3
 """s; a median period is at least this, to divide by."""
+REPEATED_RETURNS = 5
+"""Least number of returns of a scan that repeats the one before: the same two or three come by chance."""
 NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
 
 
@@ -129,7 +131,9 @@ def repeated_scans(log: LaserLog, moves: NDArray[np.bool_]) -> NDArray[np.int64]
     """The rows (H,) whose readings repeat those before, among the rows to which the robot `moves` (S −
     1,)."""
     rows = np.flatnonzero(moves & repeat_reading(log.ranges)[1:]) + 1
-    return rows[np.isfinite(log.ranges[rows]).any(axis=1)]
+    returns = np.count_nonzero(np.isfinite(log.ranges[rows]), axis=1)
+    repeated: Indices = rows[returns >= min(REPEATED_RETURNS, log.ranges.shape[1])]
+    return repeated
 
 
 def restarts_of(log: LaserLog, options: OdometryCheckOptions, breaks: BreakOptions) -> Indices:

@@ -166,8 +166,8 @@ class TrackingOptions:
     """Number of points on each side of a point between which the distance to the next one is measured. With a
     larger number the noise of ranges decides less, and small things are blurred more."""
     min_points: int = 10
-    """Scans with fewer points are not matched where there is odometry: it tells more than these do. With a
-    larger number odometry leads on more often."""
+    """Scans with fewer points, and than a quarter of the beams, are not matched where there is odometry: it
+    tells more than these do. With a larger number odometry leads on more often."""
     bridged_gap: float = 1.0
     """Without odometry, points of the first scan of a track, or of a lost scan that joins the map, get others
     between them if they are at most this far apart, m, and if fewer than `lost_inliers` of them lie on

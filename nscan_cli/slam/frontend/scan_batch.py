@@ -102,6 +102,7 @@ def scan_batches(
     # Along a path they are corrected already.
     is_swept = log.beam_times is not None and log.path is None and len(log) > 1
     period = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_swept else 1.0
+    least = min(options.min_points, log.ranges.shape[1] // 4)
     for first in range(0, len(log), SCANS_PER_BATCH):
         rows, shares = slice(first, min(first + SCANS_PER_BATCH, len(log))), NONE
         if is_swept:
@@ -112,7 +113,7 @@ def scan_batches(
         kept = spaced_points(points, ends, options.point_spacing, options.spacing_neighbours)
         is_left_out = np.isin(np.arange(first, rows.stop), frozen)
         if odometry is not None:
-            is_left_out |= (np.diff(ends) < options.min_points) & are_known(odometry[rows])
+            is_left_out |= (np.diff(ends) < least) & are_known(odometry[rows])
         kept &= np.repeat(~is_left_out, np.diff(ends))
         if not kept.all():
             points, shares = points[kept], shares[kept] if is_swept else NONE
