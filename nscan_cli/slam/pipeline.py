@@ -56,8 +56,8 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     reject_contradicting_loops(state)
     deskew_by_final_path(state)
     refine(state)
-    mend_contradicting_loops(state)
     mend_contradicting_visits(state)
+    mend_contradicting_loops(state)
     believe_odometry_over_breaks(state)
     return finish_graph(state)
 

@@ -133,6 +133,9 @@ class LoopClosureOptions:
     max_mean_chi2: float = 3.0
     """Loops contradict the rest of the graph if the mean χ² of all relations, with three degrees of freedom,
     is larger. It is below 1 on sound logs. A larger value maps less often without them, and warns less."""
+    least_closed_share: float = 0.25
+    """Without odometry, such a map must close loops for this share of the keyframes for which loops were
+    closed before: half of these and more may be wrong. A larger share keeps fewer such maps."""
     contradicted_distance: float = 20.0
     """Where visits of a place contradict each other in the finished map, the search covers at least this
     distance, m. A larger one mends larger errors and is slower."""
