@@ -1,5 +1,4 @@
-"""Stretches in which no beam comes back, or a few: a driver died, something covers the laser, or nothing is
-near."""
+"""Stretches in which no beam comes back, or a few: the laser is covered, or nothing is near."""
 
 from __future__ import annotations
 
