@@ -146,10 +146,6 @@ class _Compared:
         """The number of steps that the scans have measured."""
         return sum(step is not None for step in self.known.values())
 
-    def is_explained(self, options: FileCheckOptions) -> bool:
-        """Whether a mounting and a scale explain the steps."""
-        return is_explained(self.signed, options, self.known)
-
     @property
     def is_changed(self) -> bool:
         """Whether something was put right, or is to be said."""
@@ -178,7 +174,11 @@ def _compared_file(
         alone, masked, seen = checked_companion(way, reading, options.companion)
         if seen:
             without_him = _compared(replace(log, ranges=alone.ranges), masked, options, {})
-            is_right = not without_him.findings if way is log else without_him.is_explained(options)
+            is_right = (
+                not without_him.findings
+                if way is log
+                else is_explained(without_him.signed, options, without_him.known)
+            )
             if is_right and without_him.measured >= options.min_steps:
                 return units, held, without_him, seen
     return units, held, motion, []

@@ -96,7 +96,7 @@ def measure_steps(
         return None if scan is None else scan.points
 
     known = {} if known is None else known
-    view = narrow_view(log, options)
+    view = _narrow_view(log, options)
     pairs = list(zip(rows[0].tolist(), rows[1].tolist(), strict=True))
     new = [pair for pair in dict.fromkeys(pairs) if pair not in known]
     points = corrected or as_at_once
@@ -113,7 +113,7 @@ def measure_steps(
     return steps if turns_alone else steps.of(steps.tell_places(options))
 
 
-def narrow_view(log: LaserLog, options: StepOptions) -> tuple[float, float] | None:
+def _narrow_view(log: LaserLog, options: StepOptions) -> tuple[float, float] | None:
     """First and last direction (rad) of what the laser of a log sees; None for a wide view."""
     first, last, _ = field_of_view(log)
     return (min(first, last), max(first, last)) if abs(last - first) < options.narrow_view else None
@@ -143,9 +143,8 @@ def _matched(
     if len(seen) < least * len(points):
         return None
     again = match_scans(reference, seen, match.pose, pair, probe, is_near=True)
-    return (
-        again if again.converged and abs(wrap(again.pose[2] - match.pose[2])) <= options.agreement else None
-    )
+    is_same_turn = abs(wrap(again.pose[2] - match.pose[2])) <= options.agreement
+    return again if again.converged and is_same_turn else None
 
 
 def _in_view(points: Array, view: tuple[float, float], options: StepOptions) -> Mask:

@@ -10,11 +10,7 @@ from nscan_cli.calibration import findings, mount_findings
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, is_inverse, is_nearer, is_nearer_in_direction
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.step_evidence import (
-    StepEvidence,
-    explains_positions,
-    is_wrong_scale,
-)
+from nscan_cli.calibration.step_evidence import StepEvidence, explains_positions, is_wrong_scale
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, wrap
 

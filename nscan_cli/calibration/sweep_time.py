@@ -79,8 +79,7 @@ def _energies(
     Also returns the mean share by which turns change within a pair.
     """
     time = options.time
-    steady, uneven = list[Array](), list[Array]()
-    changes: tuple[list[float], list[float]] = [], []
+    steady, uneven = list[tuple[Array, float]](), list[tuple[Array, float]]()
     for one, other in turning_pairs(motion, longest, options, time.scans, time.most_rows):
         change = max(motion.unsteadiness(one, time), motion.unsteadiness(other, time))
         is_steady = change <= time.max_change
@@ -88,14 +87,14 @@ def _energies(
             continue
         energies = motion.energies(one, other, sweeps.tolist())
         if energies is not None:
-            (steady if is_steady else uneven).append(energies)
-            changes[not is_steady].append(change)
+            (steady if is_steady else uneven).append((energies, change))
         if len(steady) == time.pairs:
             break
     if len(steady) < time.min_steady:
-        changes[0].extend(changes[1][: time.pairs - len(steady)])
         steady += uneven[: time.pairs - len(steady)]
-    return np.array(steady).reshape(-1, len(sweeps)), float(np.mean(changes[0])) if steady else 0.0
+    changes = [change for _, change in steady]
+    found = np.array([energies for energies, _ in steady]).reshape(-1, len(sweeps))
+    return found, float(np.mean(changes)) if changes else 0.0
 
 
 def _sharpest(sweeps: Array, energies: Array, options: SweepTimeOptions) -> float:

@@ -23,6 +23,12 @@ class BlindScanOptions:
     to odometry. A larger value names more."""
 
 
+def least_returns(beams: int, usual: int) -> int:
+    """The least number of returns of a scan that tells something: the `usual` one, or a quarter of few
+    beams."""
+    return min(usual, beams // 4)
+
+
 def blind_scans(ranges: NDArray[np.float32], numbers: Indices) -> list[str]:
     """The messages on scans with ranges (S, B) and numbers (S,) that see nothing, or hardly anything, for
     long.
@@ -30,7 +36,7 @@ def blind_scans(ranges: NDArray[np.float32], numbers: Indices) -> list[str]:
     In an open field it is no fault, but nothing is mapped there, either.
     """
     options = BlindScanOptions()
-    least = min(options.min_returns, ranges.shape[1] // 4)
+    least = least_returns(ranges.shape[1], options.min_returns)
     returns = np.count_nonzero(np.isfinite(ranges), axis=1)
     is_blind = returns < max(least, 1)
     runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]

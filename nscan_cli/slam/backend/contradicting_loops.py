@@ -8,14 +8,12 @@ saw. Then the map is made again from the track alone: its joint matches close th
 
 from __future__ import annotations
 
-import numpy as np
-
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
-from nscan_cli.poses import are_known, compose
+from nscan_cli.poses import are_known
 from nscan_cli.slam.backend.contradicting_visits import worst_violation
 from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
 from nscan_cli.slam.backend.refinement import refine
-from nscan_cli.slam.keyframes.route import Route
+from nscan_cli.slam.keyframes.route import Route, extended
 from nscan_cli.slam.loop_closure.free_space_violations import is_sound
 from nscan_cli.slam.state import SlamState
 
@@ -59,15 +57,11 @@ def _closed(state: SlamState) -> int:
 
 def _mean_chi2(state: SlamState) -> float:
     """The mean χ² of all relations, each with three degrees of freedom."""
-    relations = all_widened_relations(state)
-    if not relations:
-        return 0.0
-    return float(chi2_by_three(state.energies.of(state.route, relations), state.poses).mean())
+    energy = state.energies.of(state.route, all_widened_relations(state))
+    return float(chi2_by_three(energy, state.poses).mean())
 
 
 def _track_alone(route: Route) -> Route:
     """The route with the poses of tracking."""
-    poses = [route.poses[0]]
-    for relation in route.chain[: len(route.poses) - 1]:
-        poses.append(compose(poses[-1], relation.measurement))
-    return route._replace(poses=np.array(poses))
+    begin = route._replace(rows=route.rows[:1], paths=route.paths[:1], poses=route.poses[:1])
+    return extended(begin, len(route.poses))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from nscan_cli.logs.blind_scans import least_returns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices, are_known
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
@@ -102,7 +103,7 @@ def scan_batches(
     # Along a path they are corrected already.
     is_swept = log.beam_times is not None and log.path is None and len(log) > 1
     period = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_swept else 1.0
-    least = min(options.min_points, log.ranges.shape[1] // 4)
+    least = least_returns(log.ranges.shape[1], options.min_points)
     for first in range(0, len(log), SCANS_PER_BATCH):
         rows, shares = slice(first, min(first + SCANS_PER_BATCH, len(log))), NONE
         if is_swept:
