@@ -19,7 +19,7 @@ from nscan_cli.poses import compose, wrap
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.experiments.output import table
 from tests.logs.excerpts import truth_of
 from tests.simulation.drive import Drive

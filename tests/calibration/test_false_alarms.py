@@ -17,7 +17,7 @@ from nscan_cli.calibration.view_change import direction_change
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.benchmarks.lasers import HARD, recorded
+from tests.benchmarks.laser_kinds import HARD, recorded
 from tests.calibration.test_file_check import drive
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt

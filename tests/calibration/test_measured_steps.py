@@ -14,7 +14,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
-from tests.benchmarks.lasers import HARD, recorded
+from tests.benchmarks.laser_kinds import HARD, recorded
 from tests.calibration.test_file_check import found
 from tests.data import data_file
 from tests.logs.excerpts import excerpt

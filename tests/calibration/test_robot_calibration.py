@@ -19,7 +19,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import compose, relative
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt
 from tests.simulation import faults, odometry_faults

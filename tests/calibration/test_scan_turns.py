@@ -11,7 +11,7 @@ from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.calibration.sweep_options import ScanTurnOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative, wrap
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_way, office_world

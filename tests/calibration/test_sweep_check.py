@@ -18,7 +18,7 @@ from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import relative
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.data import data_file
 from tests.simulation.building import building
 from tests.simulation.drive import Drive

@@ -15,7 +15,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.data import data_file
 from tests.simulation.building import building
 from tests.simulation.drive import Drive

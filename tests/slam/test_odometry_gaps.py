@@ -12,7 +12,8 @@ from nscan_cli.slam.mapped_drive import map_drive
 from nscan_cli.slam.odometry_gaps import bridged_gaps, bridged_gaps_said, with_bridged_gaps
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.state import SlamState
-from tests.benchmarks.lasers import HARD, rms
+from tests.benchmarks.laser_kinds import HARD
+from tests.benchmarks.lasers import rms
 from tests.logs.excerpts import excerpt
 from tests.simulation.drive import Odometry
 from tests.simulation.places import drive_through

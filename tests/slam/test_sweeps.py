@@ -13,7 +13,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.mapping.occupancy import OCCUPIED, occupancy_grid
 from nscan_cli.poses import compose, wrap
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.data import data_file
 from tests.logs.excerpts import truth_of
 from tests.simulation.drive import Drive

@@ -20,7 +20,8 @@ from nscan_cli.slam.systematic_error import (
     systematic_error,
     without_systematic_error,
 )
-from tests.benchmarks.lasers import HARD, recorded, rms
+from tests.benchmarks.laser_kinds import HARD, recorded
+from tests.benchmarks.lasers import rms
 from tests.simulation.scenes import office
 
 OPTIONS = SystematicErrorOptions()

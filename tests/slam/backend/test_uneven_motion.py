@@ -11,7 +11,7 @@ from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.poses import Array, wrap
 from nscan_cli.slam.backend.uneven_motion import path_of_sweeps
 from nscan_cli.slam.options import SlamOptions
-from tests.benchmarks.lasers import turning
+from tests.benchmarks.laser_kinds import turning
 from tests.simulation.drive import Drive
 from tests.simulation.office import office_way, office_world
 from tests.simulation.sweeping import Turning, fine_path, record_swept

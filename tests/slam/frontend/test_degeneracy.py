@@ -25,7 +25,8 @@ from nscan_cli.slam.frontend.degeneracy import (
 from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from tests.benchmarks.lasers import WAY, rms, turning
+from tests.benchmarks.laser_kinds import WAY, turning
+from tests.benchmarks.lasers import rms
 from tests.logs.excerpts import truth_of
 from tests.ndt.wall_points import room
 from tests.simulation.building import building, drive

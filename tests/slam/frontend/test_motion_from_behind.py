@@ -17,7 +17,8 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
-from tests.benchmarks.lasers import HARD, KINDS, NONE, recorded, rms, turning
+from tests.benchmarks.laser_kinds import HARD, KINDS, NONE, recorded, turning
+from tests.benchmarks.lasers import rms
 from tests.simulation.drive import Drive, Odometry
 from tests.simulation.drive import poses as driven
 from tests.simulation.faults import taken

@@ -21,7 +21,7 @@ from nscan_cli.slam.frontend.options import (
 )
 from nscan_cli.slam.frontend.track_state import TrackState
 from tests.benchmarks.consistency import backwards
-from tests.benchmarks.lasers import KINDS, WAY
+from tests.benchmarks.laser_kinds import KINDS, WAY
 from tests.simulation.building import building, drive
 from tests.slam.frontend.test_visible_points import along, tracked_poses
 

@@ -20,7 +20,7 @@ from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
 from nscan_cli.slam.frontend.tracked_scans import TrackedBatch
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import SlamOptions
-from tests.benchmarks.lasers import HARD
+from tests.benchmarks.laser_kinds import HARD
 from tests.data import data_file
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation import faults, things_beside

@@ -17,7 +17,7 @@ from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.segment_tracker import tracker_of
 from nscan_cli.slam.options import SlamOptions
-from tests.benchmarks.lasers import KINDS, WAY
+from tests.benchmarks.laser_kinds import KINDS, WAY
 from tests.simulation.building import building, drive
 from tests.slam.mapped_logs import office_log
 
